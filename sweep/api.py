@@ -1,6 +1,6 @@
-"""The public names: what `import sweep` offers, which is what `python -m sweep` does from the shell.
+"""Defines the public names: `import sweep` offers what `python -m sweep` does in the shell.
 
-What a function needs is imported when it is called: an import of all would take a second.
+Functions import what they need when they are called, since importing everything would take a second.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from distributed import Client
     from matplotlib.animation import FuncAnimation
+    from matplotlib.figure import Figure
 
     from sweep.config import Config, ConfigError, ConfigLike, load_config
     from sweep.config.film import Film
@@ -42,26 +43,26 @@ HOMES = {
     "plot": "sweep.plots.picture",
     "predict": "sweep.studies.predictions",
 }
-"""The modules that define the names which are not defined here; they are names of `sweep` all the same."""
+"""Modules of the public names that are not defined here."""
 
 
 @contextmanager
 def _prepared(
     config: ConfigLike, overrides: Mapping[str, Any], progress: bool | None, reporter: Reporter | None
 ) -> Iterator[tuple[Config, Reporter]]:
-    """Yield the checked configuration of a call, and who is told of its progress."""
+    """Yield the checked configuration of a call, and the reporter of its progress."""
     from sweep.config import load_config
-    from sweep.progress import shown
+    from sweep.progress import reporting
 
     register()
-    with shown(progress, reporter) as told:
-        checked = load_config(config, overrides, announce=told.note)
+    with reporting(progress, reporter) as reporter:
+        checked = load_config(config, overrides, announce=reporter.note)
         _refuse_arguments(checked)
-        yield checked, told
+        yield checked, reporter
 
 
 def _refuse_arguments(config: Config) -> None:
-    """Refuse a user's parameter that no keyword could give, because an argument here has its name."""
+    """Refuse a user's parameter with the name of an argument here, since no keyword could set it."""
     from inspect import signature
 
     from sweep.faults import fault_of
@@ -72,8 +73,8 @@ def _refuse_arguments(config: Config) -> None:
     verbs = run, boundaries, critical, trajectory, fit, indices
     arguments = {name for verb in verbs for name in signature(verb).parameters}
     if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
-        words = f"parameter {wrong[0]!r} has the name of an argument of sweep.run, or of another verb; rename it"
-        raise fault_of(words, file=config.origin.place)
+        message = f"parameter {wrong[0]!r} has the name of an argument of sweep.run or a similar function; rename it"
+        raise fault_of(message, file=config.origin.place)
 
 
 def run(
@@ -89,32 +90,32 @@ def run(
 ) -> xr.Dataset:
     """Run a sweep.
 
-    If `output` holds the dataset of a smaller run, of fewer cells or to an earlier `t_end`, only what it lacks is
-    simulated.  The dataset is the same, bit for bit, as that of a run of all cells at once.
+    If `output` holds the dataset of a smaller run, with fewer cells or an earlier `t_end`, only the missing part is
+    simulated. The result is the same, bit for bit, as if all cells had been run at once.
 
     Parameters
     ----------
-    config : path of a configuration, what its file would say as a mapping, or a `Config`
+    config : path of a configuration, its contents as a mapping, or a `Config`
     output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from which the same
-        call resumes.  By default nothing is written
-    fresh : discard what an earlier run left in `output`
-    rerun : "failed" or "limit": simulate again just those cells of the dataset in `output` that failed, or that
-        reached the time limit, with the settings of the integrator as they are now; the others stay as they are
-    progress : whether to show a bar; by default in notebooks alone
-    reporter : receives progress and messages in place of a bar
-    client : connected to a dask cluster whose workers run the cells, or the address of its scheduler; by default the
+        call resumes. By default nothing is written
+    fresh : discard the files of an earlier run in `output`
+    rerun : "failed" or "limit": repeat only the cells of the dataset in `output` that failed, or that reached the time
+        limit, with the present settings of the integrator; the other cells stay as they are
+    progress : whether to show a progress bar; by default only in notebooks
+    reporter : receives progress and messages instead of a bar
+    client : a client of a dask cluster whose workers run the cells, or the address of its scheduler; by default the
         threads of this process run them
     overrides : values that replace those of `config`, such as ``mu=60``, ``t_end=1000`` or ``n0=np.linspace(0, 1, 9)``
 
     Returns
     -------
-    Dataset over the axes of the configuration; the `long_name` of a variable says what it means.  If `output` is given
-    and there are more than two million cells, values are read from the file when they are asked for.
+    Dataset over the axes of the configuration; each variable is described by its `long_name`. If `output` is given and
+    there are more than two million cells, values are read from the file on demand.
 
     Raises
     ------
     ConfigError, StoreError
-        if the configuration, or what `output` holds, cannot be used.
+        if the configuration, or the contents of `output`, cannot be used.
 
     Examples
     --------
@@ -124,8 +125,8 @@ def run(
     """
     from sweep.engine.run import run
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return run(checked, output, fresh=fresh, rerun=rerun, reporter=told, client=client)
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return run(checked, output, fresh=fresh, rerun=rerun, reporter=reporter, client=client)
 
 
 def boundaries(
@@ -142,30 +143,30 @@ def boundaries(
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """The curves over two axes on which the number of reversals changes, for each value of the other axes.
+    """Find the curves over two axes on which the number of reversals changes, for each value of the other axes.
 
-    The cells of the configuration are simulated first.  Where two neighbours along `x` or `y` count differently, the
-    place between them at which each count begins is bracketed by further simulations.  Halfway between two points two
-    more cells tell whether the smooth curve passes between them; if not, a point is added there.
+    The cells of the configuration are simulated first. Where two neighbours along `x` or `y` have different counts,
+    further simulations bracket the place between them at which each count begins. Halfway between two points, two more
+    cells check whether the smooth curve passes between them; if not, a point is added there.
 
     Parameters
     ----------
     config, output, fresh, progress, reporter, client, overrides : as for `run`
-    x, y : axes over which the curves are drawn; by default the second and the first of more than one value
+    x, y : axes over which the curves are drawn; by default the second and the first with more than one value
     bracket : width of the brackets, relative to the value of the parameter along which each lies
-    deviation : how far halfway between two points the boundary may be from the smooth curve through them, relative to
-        the lengths of the axes
+    deviation : largest distance of the boundary, halfway between two points, from the smooth curve through them,
+        relative to the lengths of the axes
 
     Returns
     -------
     Dataset over the points of all curves, in order along each: the place, the `level` (the count that begins there),
-    the number of the `curve`, and of the bracket the axis along which it lies, the two simulated cells at its ends and
-    what these count.
+    the number of the `curve`, and for the bracket the axis along which it lies, the two simulated cells at its ends and
+    their counts.
 
     Raises
     ------
     ConfigError, StoreError
-        as `run`; also if the model is a formula, or there are no two axes.
+        as `run`; also if the model is a formula, or there are fewer than two axes.
 
     Examples
     --------
@@ -174,11 +175,11 @@ def boundaries(
     ('n0', 'mu')
     """
     from sweep.studies.boundaries import boundaries
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
         task = boundaries(checked, x, y, bracket, deviation)
-        return kept(task, output, fresh=fresh, reporter=told, client=client)
+        return run_study(task, output, fresh=fresh, reporter=reporter, client=client)
 
 
 def critical(
@@ -192,11 +193,11 @@ def critical(
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """Critical spins over all axes of `config` except n0: by formulas, and n_c1 by eigenvalues, n_c2 by simulation.
+    """Find the critical spins over all axes of `config` except n0, by formulas, eigenvalues and simulation.
 
-    n_c1 is the first spin, outwards from zero, at which a tiny rattle grows, by the eigenvalues.  n_c2 is the first
-    spin, outwards from that, from which the trajectory from the configuration's start point reverses before t_end: it
-    is bracketed by simulation.
+    Going outwards from zero, n_c1 is the first spin at which a tiny rattle grows, according to the eigenvalues. Going
+    outwards from n_c1, n_c2 is the first spin whose trajectory, from the configuration's start point, reverses before
+    t_end; it is bracketed by simulation.
 
     Parameters
     ----------
@@ -205,8 +206,8 @@ def critical(
 
     Returns
     -------
-    Dataset over the axes without n0.  With each `n_c2_*_simulated` come the ends of its bracket, `*_inner` and
-    `*_outer`.  A `*_reason` says why n_c1 or n_c2 is NaN; `critical_reason` is the first of the four that is not
+    Dataset over the axes without n0. Each `n_c2_*_simulated` comes with the ends of its bracket, `*_inner` and
+    `*_outer`. A `*_reason` says why n_c1 or n_c2 is NaN; `critical_reason` is the first of the four that is not
     `exists`.
 
     Raises
@@ -221,10 +222,10 @@ def critical(
     '0.005'
     """
     from sweep.studies.critical import critical
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(critical(checked, bracket), output, fresh=fresh, reporter=told, client=client)
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return run_study(critical(checked, bracket), output, fresh=fresh, reporter=reporter, client=client)
 
 
 def trajectory(
@@ -237,7 +238,7 @@ def trajectory(
     reporter: Reporter | None = None,
     **values: Any,
 ) -> xr.Dataset:
-    """Follow single cells densely in time, up to t_end.
+    """Follow individual cells with dense output, up to t_end.
 
     The method is always dopri5, whatever the configuration names: it alone can stop after any step for a sample.
 
@@ -246,19 +247,19 @@ def trajectory(
     config, progress, reporter : as for `run`
     every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
         per period of the fastest motion
-    stop_when_settled : end a trajectory when neither spin nor count can change any more, as a sweep does, and not at
-        t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
-    samples : follow so many samples of the parameters that are distributions, those with which a run begins, and not
-        the medians alone
-    values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``, of which each combination is one trajectory;
-        an axis of `config` that is not named takes its first value, with a warning if others are named.  Anything else
-        replaces a value of `config`, such as ``t_end=300``
+    stop_when_settled : end a trajectory once spin and count can no longer change, as a sweep does, instead of at t_end,
+        whatever the configuration says; always so with `t_end: .inf`
+    samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
+        samples of a run
+    values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``; each combination is one trajectory. An axis of
+        `config` that is not given takes its first value, with a warning if others are given. Anything else replaces a
+        value of `config`, such as ``t_end=300``
 
     Returns
     -------
-    Dataset over (trajectory, time): the series that the model can show, NaN after the end of a
-    trajectory.  Over (trajectory): all that a sweep gives for the cell, from the same steps, which the sampling does
-    not change.  The status is `settled` if neither spin nor count would change any more after t_stop.
+    Dataset over (trajectory, time): the series that the model supports, NaN after the end of a trajectory. Over
+    (trajectory): all results that a sweep gives for the cell, from the same steps, which the sampling does not change.
+    The status is `settled` if spin and count could no longer change after t_stop.
 
     Raises
     ------
@@ -279,12 +280,12 @@ def trajectory(
     known = parameters_of(config, values)
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
-    with _prepared(config, settings, progress, reporter) as (checked, told):
+    with _prepared(config, settings, progress, reporter) as (checked, reporter):
         found = trajectory(
-            checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=told, **cells
+            checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=reporter, **cells
         )
-    if cells and (words := first_values(checked, cells)):
-        warn(words, stacklevel=2)
+    if cells and (message := first_values(checked, cells)):
+        warn(message, stacklevel=2)
     return found
 
 
@@ -299,27 +300,27 @@ def animate(
     reporter: Reporter | None = None,
     **values: Any,
 ) -> FuncAnimation:
-    """Show how single bodies turn, side by side and in one clock.
+    """Animate the motion of bodies, side by side on a common clock.
 
     Parameters
     ----------
     source : a configuration, as for `run`, or a dataset of `trajectory` or `fit`, or the path of its file, which ends
-        in .nc.  Of a fit, the film is shown beside the body that fits it
-    output : file to write; its suffix names the format: gif, mp4 (which needs ffmpeg) or html (a page without network)
-    begin, end : the stretch of time shown; by default until a third beyond the last of the bodies' first reversals
-    speed : time shown in a second of the clip; by default such that the clip takes ten
+        in .nc. For a fit, the film is shown beside the fitted body
+    output : file to write; its suffix sets the format: gif, mp4 (needs ffmpeg) or html (a page that needs no network)
+    begin, end : the interval of time shown; by default until a third beyond the last of the bodies' first reversals
+    speed : time shown per second of the clip; by default such that the clip takes ten seconds
     progress, reporter : as for `run`
     values : the cells and other values of a configuration, as for `trajectory`; a dataset takes none
 
     Returns
     -------
-    The animation, which a notebook shows by its `to_jshtml()`.
+    The animation; show it in a notebook with `to_jshtml()`.
 
     Raises
     ------
     ConfigError
-        as `trajectory`; also if the bodies have no attitude or are too many, the stretch is empty, the speed is not
-        above zero, or there is no such format.
+        as `trajectory`; also if there are too many bodies or they have no attitude, the interval is empty, the speed is
+        not positive, or the format is unknown.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
     """
@@ -331,11 +332,11 @@ def animate(
     if output is not None:
         animation.check(Path(output))
     if animation.is_dataset(source):
-        from sweep.progress import shown as told_by
+        from sweep.progress import reporting
         from sweep.studies.filmed import shown
 
-        with told_by(progress, reporter) as told:
-            of_file = shown(source, told)
+        with reporting(progress, reporter) as reporter:
+            of_file = shown(source, reporter)
         return animation.animate(of_file, output, begin=begin, end=end, speed=speed, **values)
     followed = trajectory(cast("ConfigLike", source), progress=progress, reporter=reporter, **values)
     return animation.animate(followed, output, begin=begin, end=end, speed=speed)
@@ -355,57 +356,57 @@ def fit(
 ) -> xr.Dataset:
     """Find the body, friction and start that reproduce a film of one body.
 
-    The trajectory begins with the film, whose times are in the unit of the configuration: s with `units: SI`.
+    The trajectory begins with the film. The film's times are in the unit of the configuration: s with `units: SI`.
 
     Parameters
     ----------
-    config, progress, reporter, overrides : as for `run`.  A free parameter that has several values is sought between
-        the least and the largest.  The range of one that has a single value is found from the film and the body, and
-        widened where the best value lies at its end.  A parameter that is a distribution is free as well: that is what
-        was measured of it
-    film : a table of numbers with a header: a time, and a spin ("spin (rad/s)"), what a phone on the body tells
-        ("Gyroscope z (rad/s)") or a heading ("angle (deg)"); with a column "error", intervals follow from that, and
-        else from the residuals.  Or a `sweep.config.film.Film`
+    config, progress, reporter, overrides : as for `run`. A free parameter with several values is sought between the
+        smallest and the largest. The range of a free parameter with a single value is found from the film and the body,
+        and widened if the best value lies at its end. A parameter given as a distribution is also free, and the
+        distribution counts as a measurement
+    film : a table of numbers with a header: a time, and a spin ("spin (rad/s)"), the gyroscope reading of a phone on
+        the body ("Gyroscope z (rad/s)") or a heading ("angle (deg)"). Intervals are computed from a column "error" if
+        there is one, otherwise from the residuals. Or a `sweep.config.film.Film`
     time_column, spin_column : names of the columns of the film, with a unit if it gives none, such as "omega (deg/s)";
-        by default those with known names
-    free : names of the parameters to find.  Of the film itself, film_delay and film_bias can be found too
-    laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each takes from `config` what that
-        says of its parameters, and finds those that `config` does not say as well; it does without what it has not
+        by default columns with known names
+    free : names of the parameters to find, including film_delay and film_bias of the film itself
+    laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each law takes its parameters from
+        `config`; those that `config` does not give are also free. Parameters that a law does not have are ignored
 
     Returns
     -------
     Dataset over (parameter): the `value` that fits best, and the ends of its intervals of 68 and 95 %.  Over (time):
         the film, the fit, and which rows are outliers, left out of it.  Over (rank): all minima that were found.  The
-        attribute `fits` is 1 if what is left between film and curve is noise, and 0 if not; `fits_because` gives the
+        attribute `fits` is 1 if the difference between film and curve is noise, and 0 if not; `fits_because` gives the
         reason, `verdict` three sentences, `undetermined` what the film does not determine, and `config` runs the fitted
-        body.  With `laws`, dataset over (law, parameter) and (law, time);
-        over (law): `chi_square`, `number_free`, `akaike` and the `weight` of each.
+        body.  With `laws`, dataset over (law, parameter) and (law, time); over (law): `chi_square`, `number_free`,
+        `akaike` and the `weight` of each.
 
     Raises
     ------
     ConfigError
-        if the configuration or the film cannot be used, or the configuration is not of one body.
+        if the configuration or the film cannot be used, or the configuration does not describe one body.
     """
     from sweep.studies.laws import fitted
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return fitted(checked, film, free, laws, told, (time_column, spin_column))
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return fitted(checked, film, free, laws, reporter, (time_column, spin_column))
 
 
 def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
-    """Show the explorer of a dataset in a notebook: maps, and the trajectory of each cell that is clicked.
+    """Show the explorer of a dataset in a notebook: maps, and the trajectory of each cell that you click.
 
-    It needs the extra `explore`, and a browser on the same machine as the notebook's kernel.
+    Needs the extra `explore`, and a browser on the same machine as the notebook's kernel.
 
     Parameters
     ----------
-    dataset : of a run or of critical spins, or the path of its file
+    dataset : a run or critical spins, as a dataset or the path of its file
     height : of the page in the notebook, in pixels
 
     Returns
     -------
-    The explorer, of which a notebook shows the page; its `url` opens in a browser too.  It lives until its `close()` is
-    called, or as long as the kernel.
+    The explorer, whose page a notebook displays; its `url` also opens in a browser. It lives until its `close()` is
+    called or the kernel ends.
 
     Raises
     ------
@@ -435,19 +436,19 @@ def indices(
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """Tell on which of the uncertain parameters the results of a scene depend, by Sobol indices.
+    """Compute Sobol sensitivity indices of the uncertain parameters.
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, client, overrides : as for `run`.  Some parameters are distributions,
-        and none is an axis.  n (uncertain parameters + 2) trajectories are run, n being the samples rounded up to a
-        power of two
+    config, output, fresh, progress, reporter, client, overrides : as for `run`.  At least one parameter must be a
+        distribution, and none an axis. n (uncertain parameters + 2) trajectories are run, where n is the number of
+        samples rounded up to a power of two
 
     Returns
     -------
-    Dataset over (quantity, parameter): the index of `first_order`, which a parameter has alone, and of `total_order`,
-    with all that it shares with others, both with the ends of their intervals of 95 %.  NaN where a sample failed,
-    where not all samples have the quantity, or where all have the same.
+    Dataset over (quantity, parameter): the index `first_order` of each parameter alone, and `total_order`, which
+    includes its interactions, both with the ends of their 95 % intervals. NaN if a sample failed, if some samples lack
+    the quantity, or if all samples agree.
 
     Raises
     ------
@@ -455,10 +456,10 @@ def indices(
         as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    with _prepared(config, overrides, progress, reporter) as (checked, told):
-        return kept(indices(checked), output, fresh=fresh, reporter=told, client=client)
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return run_study(indices(checked), output, fresh=fresh, reporter=reporter, client=client)
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
@@ -467,13 +468,13 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
     Parameters
     ----------
     path : of the netCDF file
-    load : read it into memory and close the file.  If False, values are read when they are asked for, and the file
-        stays open until the dataset is closed
+    load : read the dataset into memory and close the file. If False, values are read on demand, and the file stays open
+        until the dataset is closed
 
     Raises
     ------
     StoreError
-        if the file is not such a dataset, or is larger than memory.
+        if the file is not a dataset of this program, or is larger than memory.
 
     Examples
     --------
@@ -490,19 +491,25 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
 
 
 class Accessor:
-    """What is ours of a dataset of xarray: `dataset.sweep.plot()`, `dataset.sweep.trajectory(mu=60)`."""
+    """Adds methods of this package to xarray datasets: `dataset.sweep.plot()`, `dataset.sweep.trajectory(mu=60)`."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
-    def plot(self, variable: str | None = None, **options: Any) -> Any:
-        """Draw the dataset; arguments, figure and errors as of `sweep.plot`."""
-        from sweep.plots.picture import plot  # which loads matplotlib
+    def __repr__(self) -> str:
+        from sweep.results.summary import describe
+
+        title = self._dataset.attrs.get("title", "no title")
+        return f"<sweep: {title}>\n{describe(self._dataset)}\nMethods: plot(), trajectory()"
+
+    def plot(self, variable: str | None = None, **options: Any) -> Figure:
+        """Draw the dataset; arguments, figure and errors as for `sweep.plot`."""
+        from sweep.plots.picture import plot  # loads matplotlib
 
         return plot(self._dataset, variable, **options)
 
-    def trajectory(self, **values: Any) -> Any:
-        """Follow single cells densely in time, with the configuration of the dataset.
+    def trajectory(self, **values: Any) -> xr.Dataset:
+        """Follow individual cells with dense output, using the configuration of the dataset.
 
         Parameters
         ----------
@@ -513,11 +520,11 @@ class Accessor:
         ValueError
             if the dataset contains no configuration.
         ConfigError
-            as `sweep.trajectory`; also if its model is code of a user, which runs only if `sweep.trajectory` is given
-            the configuration.
+            as `sweep.trajectory`; also if the model is user-defined: its code runs only if you pass the configuration
+            to `sweep.trajectory`.
         """
         if "config" not in self._dataset.attrs:
-            raise ValueError("the dataset tells no configuration; call sweep.trajectory with one")
+            raise ValueError("the dataset contains no configuration; call sweep.trajectory with one")
         from sweep.results.configuration import configuration
 
         return trajectory(configuration(self._dataset), **values)
@@ -525,7 +532,7 @@ class Accessor:
 
 @cache
 def register() -> None:
-    """Make `Accessor` the attribute `sweep` of every dataset."""
+    """Register `Accessor` as the attribute `sweep` of every dataset."""
     import xarray as xr
 
     xr.register_dataset_accessor("sweep")(Accessor)  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""What the user can mend: faults of a configuration, each with the place where to correct it, and of files."""
+"""Defines errors that the user can fix: faults of a configuration, each with its place, and of files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MAX_LINES = 20
 
 
 def spell(path: Path) -> str:
-    """A path as text: body.b[2] for ("body", "b", 2)."""
+    """Return a path as text: body.b[2] for ("body", "b", 2)."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{brief(part, 60)}" if text else brief(part, 60)
@@ -21,33 +21,33 @@ def spell(path: Path) -> str:
 
 
 def quote(value: object) -> str:
-    """A value as YAML has it, without its middle if it is long."""
+    """Return a value as YAML writes it, shortened in the middle if it is long."""
     if value is None or isinstance(value, bool):
         return "nothing" if value is None else str(value).lower()
     return brief(repr(value).removesuffix(".0") if isinstance(value, float) else repr(value), 60)
 
 
 def brief(text: str, limit: int = 200) -> str:
-    """`text` as it is printed, without its middle if it is then long."""
+    """Return `text` in printable form, shortened in the middle if it is long."""
     shown = printable(text)
     return shown if len(shown) <= limit else f"{shown[: limit // 2]}…{shown[-limit // 2 :]}"
 
 
 def printable(text: str) -> str:
-    """`text` on one line, with characters that cannot be printed, or could control a terminal, escaped."""
+    """Return `text` on one line, escaping characters that cannot be printed or could control a terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def either(names: Iterable[str]) -> str:
-    """Names among which to choose: "a, b or c"; "" if there are none."""
+    """Join alternatives: "a, b or c"; "" if there are none."""
     *most, last = [*names] or [""]
     return f"{', '.join(most)} or {last}" if most else last
 
 
 def suggestion(word: object, names: Iterable[str], paths: Mapping[str, str] | None = None) -> str:
-    """The one of `names` that may be meant by a misspelt `word`, as words to add to a message; "" if none is close.
+    """Return a hint which of `names` a misspelt `word` may mean, to add to a message; "" if none is close.
 
-    `paths` tells what to write for a name, where that is not the name itself.
+    `paths` gives the spelling to suggest for a name, if that is not the name itself.
     """
     spelled = {name.lower(): (paths or {}).get(name, name) for name in names}
     close = get_close_matches(word.lower()[:100], spelled, n=1) if isinstance(word, str) else []
@@ -59,25 +59,30 @@ def counted(number: int, noun: str, plural: str = "") -> str:
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
+_CLOCK = ((172800, 86400, "days", 3600, "h"), (3600, 3600, "h", 60, "min"), (120, 60, "min", 1, "s"))
+"""For each unit of time: seconds above which it is used, its size in seconds, and the next smaller unit."""
+
+
 def duration(seconds: float) -> str:
-    """Return a time in a unit that people use, such as "0.35 s", "57 min", "3.4 h" or "120 days"."""
-    for size, unit in ((86400, "days"), (3600, "h"), (60, "min")):
-        if seconds >= 2 * size:
-            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+    """Return a time as people say it, such as "0.35 s", "57 min", "1 h 20 min" or "120 days"."""
+    for start, size, unit, part, smaller in _CLOCK:
+        if seconds >= start:
+            whole, rest = divmod(round(seconds / part), size // part)
+            return f"{round(seconds / size)} {unit}" if whole >= 10 or not rest else f"{whole} {unit} {rest} {smaller}"
     return "under 1 ms" if 0 < seconds < 1e-3 else f"{float(f'{seconds:.2g}'):g} s"
 
 
 def refusal(given: object, wanted: str, names: Iterable[str] = ()) -> str:
-    """Say that a value is `given` where it must be `wanted`, and which of `names` may be meant."""
+    """Return a message that a value is `given` where it must be `wanted`, with a hint which of `names` may be meant."""
     return f"must be {wanted}, not {quote(given)}{suggestion(given, names)}"
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong and what to do about it, with its place; `line` and `column` count from one."""
+    """What is wrong and what to do about it, and where; `line` and `column` count from one."""
 
     file: str
-    """The file, or "" for a value that comes from no file; `path` then begins with the argument that gave it."""
+    """The file, or "" for a value that does not come from a file; `path` then begins with the argument that gave it."""
     line: int | None
     column: int | None
     path: Path
@@ -89,15 +94,15 @@ class Fault:
 
 
 class Refused(ValueError):
-    """What the user can mend, such as a configuration or a file that cannot be used; the text says how."""
+    """An error that the user can fix, such as an unusable configuration or file; the text says how."""
 
 
 class ConfigError(Refused):
-    """A configuration that cannot be run; `faults` has an entry for each thing to correct, in the order of lines."""
+    """A configuration that cannot be run; `faults` has an entry for each error, ordered by line."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = sorted(faults, key=lambda fault: (fault.line or 0, fault.column or 0))
-        super().__init__(self.faults)  # by which another process is told of it
+        super().__init__(self.faults)  # pickling passes these to other processes
 
     def __str__(self) -> str:
         lines = [str(fault) for fault in self.faults[:_MAX_LINES]]
@@ -107,5 +112,5 @@ class ConfigError(Refused):
 
 
 def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> ConfigError:
-    """The error of one fault that has no column."""
+    """Return the error for one fault that has no column."""
     return ConfigError([Fault(file, line, None, path, message)])

@@ -1,4 +1,4 @@
-"""The cells of a sweep, each one trajectory, in the C order of the axes."""
+"""Defines the cells of a sweep, each one trajectory, in the C order of the axes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Tile = tuple[slice, ...]
 
 
 CASE, SAMPLE = "case", "sample"
-"""Names of the dimension along the rows of a table: cases that are listed, or samples that are drawn."""
+"""Names of the dimension along the rows of a table: listed cases, or drawn samples."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        rows = {len(column) for column in self.table.values()}  # all are of one length
+        rows = {len(column) for column in self.table.values()}  # all columns have the same length
         return (*map(len, self.axes.values()), *rows)
 
     @property
@@ -49,25 +49,25 @@ class Grid:
         return prod(self.shape)
 
     def columns(self) -> dict[str, Array]:
-        """Values of all parameters, axes and constants, each of shape (size,)."""
+        """Return values of all parameters, axes and constants, each of shape (size,)."""
         mesh = np.meshgrid(*map(np.arange, self.shape), indexing="ij")
         return self._at([place.ravel() for place in mesh]) | {
             name: np.full(self.size, value) for name, value in self.constants.items()
         }
 
     def _at(self, places: Sequence[Any]) -> dict[str, Array]:
-        """Values of what varies, at these indices along each dimension."""
+        """Return values of everything that varies, at these indices along each dimension."""
         found = {name: values[at] for (name, values), at in zip(self.axes.items(), places, strict=False)}
         return found | {name: values[places[-1]] for name, values in self.table.items()}
 
     def part(self, places: Sequence[Any]) -> Grid:
-        """The grid over these places along each dimension, such as a tile."""
+        """Return the grid over these places along each dimension, such as a tile."""
         found = self._at(places)
         axes, table = ({name: found[name] for name in names} for names in (self.axes, self.table))
         return replace(self, axes=axes, table=table)
 
     def tiles(self, cells: int) -> list[Tile]:
-        """Tiles of about `cells` cells that cover the grid; each is contiguous in C order."""
+        """Return tiles of about `cells` cells that cover the grid; each is contiguous in C order."""
         sides, inner = [1] * len(self.shape), self.size
         for position, length in enumerate(self.shape):
             inner //= length
@@ -82,13 +82,13 @@ class Grid:
         ]
 
     def take(self, cells: Array) -> Grid:
-        """The cells with these indices, as a list of cases."""
+        """Return the cells with these indices, as a list of cases."""
         if not self.shape:
             return Grid({}, {}, {name: np.full(len(cells), value) for name, value in self.constants.items()})
         return Grid({}, self.constants, self._at(np.unravel_index(cells, self.shape)))
 
     def sample(self, cells: int) -> Grid:
-        """About `cells` of the cells, evenly along each dimension with both its ends; all if there are no more."""
+        """Return about `cells` of the cells, evenly spaced along each dimension including its ends; at most all."""
         if self.size <= cells:
             return self
         each = max(2, int(cells ** (1 / sum(n > 1 for n in self.shape))))
@@ -96,7 +96,7 @@ class Grid:
         return self.part(places)
 
     def of_bodies(self) -> Grid:
-        """The grid of the bodies, without the start parameters.  Every case is a body of its own."""
+        """Return the grid of the bodies, without the start parameters. Every case is a separate body."""
         fixed = {name: float(values[0]) for name, values in self._at([slice(1)] * len(self.shape)).items()}
         kept = {name: values for name, values in self.axes.items() if name not in START}
         table = self.table if self.row == CASE or set(self.table) - START else {}
@@ -104,20 +104,20 @@ class Grid:
         return replace(self, axes=kept, constants=constants, table=table)
 
     def bodies(self) -> tuple[Grid, Array]:
-        """The grid of the bodies, and for each cell the index of its body in it."""
+        """Return the grid of the bodies, and for each cell the index of its body."""
         bodies = self.of_bodies()
         own = [n if dim in bodies.dims else 1 for dim, n in zip(self.dims, self.shape, strict=True)]
         return bodies, np.broadcast_to(np.arange(bodies.size).reshape(own), self.shape).ravel()
 
 
 TILE = 1 << 18
-"""Cells examined at a time, when all cells are."""
+"""Number of cells examined at a time, when all cells are."""
 
 BODY = tuple(p.name for p in PARAMETERS.values() if p.section in ("body", ""))
-"""Names of the parameters of the body, gravity among them."""
+"""Names of the parameters of the body, including gravity."""
 
 
 def distinct(grid: Grid, names: tuple[str, ...]) -> Iterator[dict[str, Array]]:
-    """Columns of cells that have every combination of the parameters `names`, a bounded number of cells at a time."""
+    """Yield columns of cells with every combination of the parameters `names`, a bounded number of cells at a time."""
     grid = replace(grid, axes={n: v if n in names else v[:1] for n, v in grid.axes.items()})
     return (grid.part(tile).columns() for tile in grid.tiles(TILE))

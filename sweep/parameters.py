@@ -1,6 +1,6 @@
-"""The physical parameters: names, meanings, units, defaults and bounds, stated here and nowhere else.
+"""Defines the physical parameters: names, meanings, units, defaults and bounds, stated here and nowhere else.
 
-The schema of the configuration, the attributes of the dataset and the documentation are made from this table.
+The schema of the configuration, the attributes of the dataset and the documentation are generated from this table.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class Parameter:
 
     name: str
     section: str
-    """Section of the configuration in which it stands; "" for the top."""
+    """Section of the configuration that contains it; "" for the top level."""
     units: Unit | str
-    """Powers of length, time and mass; or the unit as text, of a user's model."""
+    """Powers of length, time and mass; or the unit as text, in a user's model."""
     long_name: str
-    """What figures call it, without the unit; with its symbol."""
+    """Label in figures, without the unit but with the symbol."""
     default: float | None
     """Value of the paper's standard case; None if the configuration has to give one."""
     above: float = -inf
@@ -35,11 +35,11 @@ class Parameter:
     at_least: float = -inf
     """Inclusive lower bound."""
     description: str = ""
-    """What it is, in a sentence, where the `long_name` does not say it."""
+    """Meaning in a sentence, if the `long_name` is not enough."""
 
     @property
     def symbol(self) -> str:
-        """What figures write for it: the Greek or indexed letter in its `long_name`, or else its name."""
+        """Symbol in figures: the Greek or indexed letter in the `long_name`, or else the name."""
         return next((word for word in self.long_name.split() if not word.isascii()), self.name)
 
     @property
@@ -53,7 +53,7 @@ class Parameter:
 
     @property
     def meaning(self) -> str:
-        """What it is, with its unit, for messages and tables."""
+        """Meaning and unit, for messages and tables."""
         alone = self.name in SI_ALONE
         unit = named(self.units, SI if alone else PAPER_UNITS)
         return self.long_name + (f", in {unit}" if unit else "") + (" (units: SI only)" if alone else "")
@@ -64,10 +64,13 @@ class Parameter:
 
     @property
     def allowed(self) -> str:
-        """The bounds in words, for messages to the user."""
+        """Permitted values in words, for messages to the user."""
+        return f"a finite number {self.bounds()}".rstrip()
+
+    def bounds(self, largest: float = inf) -> str:
+        """Return the bounds below `largest`, such as "> 0 and < 1"."""
         marks = ((">", self.above), (">=", self.at_least), ("<", self.below))
-        bounds = " and ".join(f"{sign} {bound:.6g}" for sign, bound in marks if abs(bound) != inf)
-        return f"a finite number {bounds}".rstrip()
+        return " and ".join(f"{sign} {bound:.6g}" for sign, bound in marks if abs(bound) < largest)
 
 
 SI_ALONE = ("mass", "gravity")
@@ -86,7 +89,7 @@ _ANGLE: _Bounds = {"above": -pi / 2, "below": pi / 2}
 _POINT: _Bounds = {}
 
 _Row = tuple[str, Unit, str, float | None, _Bounds, *tuple[str, ...]]
-"""Name, unit, `long_name`, default, bounds and perhaps the `description` of a parameter."""
+"""Name, unit, `long_name`, default, bounds and optional `description` of a parameter."""
 
 _SECTIONS: dict[str, tuple[_Row, ...]] = {
     "body": (
@@ -151,18 +154,18 @@ PARAMETERS: dict[str, Parameter] = {
 }
 
 DENSITY = Parameter("density", "", u.MASS_DENSITY, "density of a body of one material", None, **_MASS)
-"""No key of a configuration: it is measured instead of the mass."""
+"""Not a key of a configuration: it can be measured instead of the mass."""
 
 PAPER_PARAMETERS: dict[str, Parameter] = {
     name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")
 }
-"""The parameters of the paper's models.  Their defaults are in the paper's units, and they have none in SI."""
+"""The parameters of the paper's models. Defaults are in the paper's units; there are none in SI."""
 
 
 def sections(table: Mapping[str, Parameter]) -> tuple[str, ...]:
-    """Names of the sections in which the parameters of a table stand."""
+    """Return the names of the sections that contain the parameters of a table."""
     return tuple(dict.fromkeys(p.section for p in table.values() if p.section))
 
 
 START = frozenset(p.name for p in PARAMETERS.values() if p.section == "start")
-"""Names of the parameters of the start, on which the critical spins and the form factor do not depend."""
+"""Names of the parameters of the start, on which critical spins and the form factor do not depend."""

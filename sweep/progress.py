@@ -1,4 +1,4 @@
-"""Shows the progress of a run on the terminal and in a notebook, with the bars of rich."""
+"""Shows the progress of a run in the terminal and in a notebook, with progress bars of rich."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from sweep.engine.reporter import Reporter
 from sweep.jit import showing
 
 
-def shown(progress: bool | None, reporter: Reporter | None = None) -> AbstractContextManager[Reporter]:
-    """Choose who is told of the progress of a call: `reporter` if there is one, else a bar where one is wanted.
+def reporting(progress: bool | None, reporter: Reporter | None = None) -> AbstractContextManager[Reporter]:
+    """Choose the reporter of a call: `reporter` if it is given, otherwise a progress bar if one is wanted.
 
     Parameters
     ----------
-    progress : whether a bar is wanted; None if only in a notebook
+    progress : whether to show a bar; None for notebooks only
     """
     if reporter or not (in_notebook() if progress is None else progress):
         return nullcontext(reporter or Reporter())
@@ -31,7 +31,7 @@ def shown(progress: bool | None, reporter: Reporter | None = None) -> AbstractCo
 
 
 def in_notebook() -> bool:
-    """Tell if this process is the kernel of a notebook."""
+    """Return whether this process is the kernel of a notebook."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
@@ -40,19 +40,19 @@ _COMPILING = "compiling for this model and machine; later runs find it in the ca
 
 
 _LOGGED = 60.0
-"""Time in s from one line to the next where there is no terminal for a bar, such as in the log of a job."""
+"""Seconds between lines if there is no terminal for a bar, as in the log of a job."""
 
 
 class _Console(Console):
     def on_broken_pipe(self) -> None:
-        """Leave it to the caller what a closed pipe means; rich would end the process with exit code 1."""
+        """Raise the error, so that the caller handles the closed pipe; rich would end the process with exit code 1."""
         raise BrokenPipeError
 
 
 class Terminal(Reporter):
-    """A bar with what is done and the time left, of cells also failures and trajectories per second.
+    """A progress bar with the remaining time and, when cells are counted, failures and trajectories per second.
 
-    Where no bar can move, as in the log of a job, it is a line, a minute apart and at the end.  In a notebook the bar
+    Without a terminal, as in the log of a job, it prints a line once a minute and at the end. In a notebook the bar
     moves if ipywidgets is installed, which rich needs there.
     """
 
@@ -61,7 +61,7 @@ class Terminal(Reporter):
         self.console = _Console(stderr=True, quiet=quiet, highlight=False, force_jupyter=widgets)
         self.last: Done | None = None
         self._bar: Progress | None = None
-        self._told = False
+        self._announced = False
         self._logged = time.monotonic()
 
     def __enter__(self) -> Terminal:
@@ -77,14 +77,14 @@ class Terminal(Reporter):
 
     @contextmanager
     def _compiling(self) -> Iterator[None]:
-        """One line for as long as something compiles: with a spinner, where one can turn."""
+        """Show a message while something compiles, with a spinner if the terminal can show one."""
         if self._bar is None and self.console.is_terminal:
             with self.console.status(_COMPILING):
                 yield
         else:
-            if not self._told:
+            if not self._announced:
                 self.note(_COMPILING)
-            self._told = True
+            self._announced = True
             yield
 
     def note(self, message: str) -> None:
@@ -104,12 +104,12 @@ class Terminal(Reporter):
             self._logged = time.monotonic()
 
 
-# Characters that all words need, with room for a bar.
+# Width that fits all texts and still leaves room for a bar.
 _WIDE = 80
 
 
 def _line(unit: str, console: Console) -> Progress:
-    """The line that is shown: on a narrow terminal the bar, and no more words than leave room for it."""
+    """Return the progress line: on a narrow terminal the bar, with only as much text as leaves room for it."""
     whole, count = Column(no_wrap=True), "{task.completed:.0f}/{task.total:.0f}"
     left = TimeRemainingColumn(compact=True, table_column=whole)
     if console.width < _WIDE:

@@ -1,4 +1,4 @@
-"""Units: the powers of a quantity, what they are called in the paper's units and in SI, and what users may write."""
+"""Defines units: the powers of a quantity, their names in the paper's units and in SI, and what users may write."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from math import pi
 
 PAPER_UNITS, SI = "paper", "SI"
-"""Systems of units: lengths in c, times in sqrt(c/g) and a mass of one, or SI."""
+"""Systems of units: lengths in c, times in sqrt(c/g) and mass one, or SI."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Powers of length, time, mass and angle; forces and energies of a moving body are those per unit mass."""
+    """Powers of length, time, mass and angle; forces and energies of a moving body are per unit mass."""
 
     length: int = 0
     time: int = 0
@@ -22,16 +22,17 @@ class Unit:
 
     @property
     def si(self) -> str:
-        """CF unit in SI, such as "kg m2 s-1"; empty for a plain number."""
+        """Return the CF unit in SI, such as "kg m2 s-1"; empty for a plain number."""
         powers = {"kg": self.mass, "radian": self.angle, "m": self.length, "s": self.time}
         return _product(dict(sorted(powers.items(), key=lambda each: each[1] < 0)))
 
     @property
     def paper(self) -> str:
-        """The unit in the paper's c, g and m, such as "sqrt(g/c)"; empty for a plain number, "radian" for an angle."""
+        """Return the unit in the paper's c, g and m, such as "sqrt(g/c)"; "" for a plain number, "radian" for an
+        angle."""
         if self == ANGLE:
             return self.si
-        g, c = -self.time, 2 * self.length + self.time  # twice the powers, as a time is sqrt(c/g)
+        g, c = -self.time, 2 * self.length + self.time  # twice the powers, since a time is sqrt(c/g)
         whole = _product({"m": self.mass, "g": int(g / 2), "c": int(c / 2)})
         return f"{whole} {_ROOTS[g - 2 * int(g / 2), c - 2 * int(c / 2)]}".strip()
 
@@ -63,31 +64,31 @@ WRITTEN: dict[Unit, dict[str, float]] = {
     ACCELERATION: {"m/s2": 1.0, "cm/s2": 1e-2},
     DRAG: {"kg m2/s": 1.0, "N m s": 1.0, "g cm2/s": 1e-7},
 }
-"""Units that users may write, in those of SI."""
+"""Units that users may write, as multiples of SI units."""
 
 NUMERAL = r"[-+−]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+−]?[0-9]+)?"
 """Decimal digits, with a hyphen or a minus sign."""
 
-# A comma before three digits may set off thousands.
+# A comma before three digits may be a thousands separator.
 _WITH_COMMA = r"(?![-+−]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9]))[-+−]?[0-9]+,[0-9]+"
 _QUANTITY = re.compile(rf"({_WITH_COMMA}|{NUMERAL}) *(?:(?:±|\+/?-) *({_WITH_COMMA}|{NUMERAL}))? *([^\d,.].*)")
 
 
 def number(text: str) -> float | None:
-    """The number that a text spells in decimal digits; None if it spells none."""
+    """Return the number that a text spells in decimal digits; None if it is not a number."""
     return float(text.replace("−", "-")) if re.fullmatch(NUMERAL, text) else None
 
 
 def factor(written: str, unit: Unit) -> float | None:
-    """How many units of SI a unit is, such as 1000 for "g/cm3"; None if it is none, or one of something else."""
+    """Return the SI factor of a unit, such as 1000 for "g/cm3"; None if it is unknown or of another quantity."""
     plain = re.sub(r"[ *·]+", " ", unicodedata.normalize("NFKC", written).replace("^", ""))
     return WRITTEN.get(unit, {}).get(plain.strip())
 
 
 def quantity(text: str, unit: Unit) -> tuple[float, float] | None:
-    """A number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm" or "12,0±0,1cm".
+    """Return a number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm" or "12,0±0,1cm".
 
-    The result is None if the text is something else.
+    The result is None if the text has another form.
     """
     found = _QUANTITY.fullmatch(text.strip())
     scale = factor(found[3], unit) if found else None
@@ -98,20 +99,20 @@ def quantity(text: str, unit: Unit) -> tuple[float, float] | None:
 
 
 def unit_in(text: str) -> str:
-    """The unit that follows the number in a text, such as "cm" in "12 cm"; empty if there is none."""
+    """Return the unit after the number in a text, such as "cm" in "12 cm"; empty if there is none."""
     found = _QUANTITY.fullmatch(text.strip())
     return found[3].strip() if found else ""
 
 
 def unit_of(units: Unit | str) -> Unit | None:
-    """The unit itself where a user's model gives it as text, such as "radian" or "m/s"; None if that is none of SI."""
+    """Return the unit that a user's model gives as text, such as "radian" or "m/s"; None if it is not an SI unit."""
     if isinstance(units, Unit):
         return units
     return next((unit for unit in WRITTEN if units == unit.si or factor(units, unit) == 1), None)
 
 
 def named(units: Unit | str, system: str) -> str:
-    """The unit in a system of units; empty for a plain number, and in a system that only a user's model knows.
+    """Return the unit in a system of units; empty for a plain number, and in a system of a user-defined model.
 
     A unit that a user's model gives as text is the same in every system.
     """
@@ -122,7 +123,7 @@ def named(units: Unit | str, system: str) -> str:
 
 
 def is_of_paper(units: str) -> bool:
-    """Tell whether a unit is made of the paper's c, g and m."""
+    """Return whether a unit is built from the paper's c, g and m."""
     letters = set(re.findall(r"[A-Za-z]+", units))
     return letters <= {"sqrt", "c", "g", "m"} and not letters <= {"m"}
 
@@ -131,7 +132,7 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def pretty(units: str) -> str:
-    """A unit as figures print it: kg m²/s for "kg m2 s-1", and √(g/c) for "sqrt(g/c)"."""
+    """Return a unit as figures print it: kg m²/s for "kg m2 s-1", and √(g/c) for "sqrt(g/c)"."""
     parts = [re.fullmatch(r"([A-Za-z]+)(-?)(\d*)", part) for part in units.replace("radian", "rad").split()]
     if not all(parts):
         return units.replace("sqrt", "√")

@@ -1,4 +1,4 @@
-"""The description of a variable of the dataset: its type, its units and what its values mean."""
+"""Describes a variable of the dataset: its type, its units and the meaning of its values."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from sweep.units import Unit, named
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of the dataset; without a flag set, it has one value per cell."""
+    """One variable of the dataset; unless a flag is set, it has one value per cell."""
 
     dtype: str
     """Type in the dataset, by its NumPy name."""
     units: Unit | str
-    """Powers of length, time and mass; or the unit as text, of a user's model."""
+    """Powers of length, time and mass; or the unit as text, in a user's model."""
     long_name: str
-    """What figures call it, without the unit.  To a question, a flag answers yes or no."""
+    """Label in figures, without the unit. If it is a question, the flags answer yes or no."""
     description: str = ""
-    """What it is, in a sentence, where the `long_name` does not say it."""
+    """Meaning in a sentence, if the `long_name` is not enough."""
     flags: Mapping[int, str] | None = None
-    """Meaning of each value, for a variable that only takes a few integers."""
+    """Meaning of each value, for a variable that takes only a few integer values."""
     per_body: bool = False
-    """Whether it has one value per body: it does not depend on the parameters of the start."""
+    """Whether it has one value per body, that is, does not depend on the parameters of the start."""
     along: str | None = None
     """Name of one further dimension, after those of the cells; its coordinate counts from one."""
     of_sound_runs: bool = False
@@ -32,6 +32,6 @@ class Variable:
 
 
 def attributes(of: Variable | Parameter, system: str) -> dict[str, str]:
-    """The CF attributes in a system of units: a plain number has no unit, or xarray would write "[1]" at its axis."""
+    """Return the CF attributes in a system of units; plain numbers have no unit, or xarray would print "[1]"."""
     found = {"long_name": of.long_name, "units": named(of.units, system), "description": of.description}
     return {key: words for key, words in found.items() if words}

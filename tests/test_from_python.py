@@ -92,7 +92,7 @@ def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
     for cell, said in (({"mu": []}, "mu: axis is empty"), ({"x0": 20}, "start point off the ellipsoid at x0=20")):
         with pytest.raises(ConfigError, match=f"^{said}"):
             sweep.trajectory(SAID, **cell)
-    with pytest.raises(ConfigError, match=r"^mu: is no parameter of the noslip model; its parameters are a, b"):
+    with pytest.raises(ConfigError, match=r"^mu: is not a parameter of the noslip model; its parameters are a, b"):
         sweep.trajectory({"model": "noslip"}, mu=60)
 
 
@@ -216,6 +216,10 @@ def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     assert maps.sweep.plot("status", sel={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)
     opened = sweep.open(tmp_path / "quick.nc")
     xr.testing.assert_equal(opened.sweep.trajectory(mu=60, b=3), sweep.trajectory(SAID, mu=60, b=3))
+    assert repr(opened.sweep).startswith(
+        "<sweep: quick: reversals of a rattleback (averaged model)>\n10 cells (mu 5 × b 2)"
+    )
+    assert {"plot", "trajectory"} <= {*dir(opened.sweep)}
     xr.testing.assert_equal(opened.sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20))
 
 
@@ -243,10 +247,10 @@ def test_what_a_dataset_tells_has_to_be_a_configuration(text: str) -> None:
 def test_a_dataset_does_not_run_the_code_of_another(tmp_path: Path) -> None:
     (tmp_path / "evil.py").write_text("raise SystemExit\n", encoding="utf-8")
     dataset = sweep.predict(SAID)
-    with pytest.raises(ValueError, match="tells no configuration; call"):
+    with pytest.raises(ValueError, match="contains no configuration; call"):
         dataset.drop_attrs().sweep.trajectory()
     dataset.attrs["config"] = f"model: {tmp_path / 'evil.py'}"
-    with pytest.raises(ConfigError, match="is not run for a configuration that comes from a dataset"):
+    with pytest.raises(ConfigError, match="refusing to run user code named inside a dataset"):
         dataset.sweep.trajectory()
 
 

@@ -1,4 +1,4 @@
-"""Speed against error for every method and model, and cases that are hard to get right."""
+"""Speed against error for every method and model, and hard cases."""
 
 from sweep.bench.report import bench
 

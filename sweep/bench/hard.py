@@ -1,4 +1,4 @@
-"""Cases that are hard to get right, for every method: what must come of them, what did, and whether the two agree."""
+"""Runs hard cases with every method, and compares the required outcome with the result."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from sweep.report.rows import Row, Section, states
 from sweep.results.dataset import STATUSES
 
 LONGEST, LONG = 30_000.0, 1e6
-"""Ends of runs until all has settled, and of the longest run, in sqrt(c/g)."""
+"""Times by which all has settled, and of the longest run, in sqrt(c/g)."""
 
 TIMES = 1e-3
-"""Bound of the error in the time at which a trajectory fails."""
+"""Bound on the error of the time at which a trajectory fails."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """Trajectories of the slip model, and how closely every method must agree with a run at shorter steps."""
+    """Trajectories of the slip model, and how closely every method must agree with a run with shorter steps."""
 
     names: Sequence[str]
-    """One for each trajectory."""
+    """One entry for each trajectory."""
     columns: Columns
     t_end: float
     end: int | Sequence[int] = TIME_LIMIT
     """How the trajectories must end."""
     near: float | Array = 1e-7
-    """Bound of the error in spin.  Where a trajectory must fail, its time is compared instead."""
+    """Bound on the error in spin. For a trajectory that must fail, its time is compared instead."""
     energy: float = 1e-4
-    """Bound of `energy_error`."""
+    """Bound on `energy_error`."""
     spin: Array | None = None
-    """The spin that theory demands, where it does."""
+    """The spin that theory requires, where it does."""
     settle: bool = False
     tolerance: float = TOLERANCE
     stiff: bool = False
-    """Whether it is for methods alone whose step no stability limits: dopri5 would take minutes."""
+    """Whether the case is only for methods without a stability limit: dopri5 would take minutes."""
     fine_end: float | None = None
-    """End of the run at shorter steps, if it need not go on to `t_end`."""
+    """End of the run with shorter steps, if it need not go on to `t_end`."""
 
 
 def cases() -> Iterator[Case]:
@@ -63,16 +63,17 @@ def cases() -> Iterator[Case]:
     mu = np.array([75.0, 200.0])
     yield Case([f"b = 9.99, μ = {x:g}" for x in mu], standard(b=9.99, mu=mu), LONGEST, settle=True)
     yield Case([f"b = 1.001, μ = {x:g}" for x in mu], standard(b=1.001, mu=mu), 1000.0)
-    # Without an angle between the axes nothing couples the rattle to the spin, which gains its energy at most.
+    # Without an angle between the axes nothing couples the rattle to the spin, which gains at most the rattle's energy.
     columns = standard(delta=[0.0, 1e-12])
     spin, rattle, inertia = slip.MODEL.energy(slip.MODEL.start(columns), slip.MODEL.constants.of(columns))
     yield Case(["δ = 0", "δ = 1e-12"], columns, 3000.0, near=rattle / (inertia * spin), spin=spin)
-    # Rattle may set the body spinning, but only as fast as its energy allows, much of which the first slip takes.
+    # The rattle may set the body spinning, but only as fast as its energy allows, much of which is lost in the first
+    # slip.
     yield Case(["n0 = 0"], standard(n0=0.0), LONGEST, SETTLED, energy=0.01, settle=True)
-    # A body that does not rattle must not start to.
+    # A body that does not rattle must not start to rattle.
     names, spin = ["at rest, no rattle", "upright spin of 0.05, no rattle"], np.array([0.0, 0.05])
     yield Case(names, standard(n0=spin, x0=0.0, y0=0.0), 1000.0, near=1e-16, energy=1e-15, spin=spin)
-    # The contact point half an axis away.
+    # The contact point starts half an axis away.
     yield Case(["start at x0 = a/2", "start at y0 = b/2"], standard(x0=[5.0, 0.0], y0=[0.0, 1.5]), 100.0)
     # Spins at which the body leaves the plane, or the normal force has no solution (Painlevé's paradox).
     for n0, mu0, x0, end in (
@@ -80,7 +81,7 @@ def cases() -> Iterator[Case]:
         (3.0, 20.0, 1.0, LIFT_OFF), (3.0, 75.0, 0.01, LIFT_OFF), (3.0, 60.0, 0.01, PARADOX),
     ):  # fmt: skip
         # Towards a paradox R grows without bound, and the balance of the last steps is off by 1e-6 to 1e-3, whatever
-        # the step: by adams 4e-4, 1e-4, 4e-6, 8e-4 and 4e-5 at 1, 0.8, 0.5, 0.4 and 0.3 of one step.
+        # the step: with adams 4e-4, 1e-4, 4e-6, 8e-4 and 4e-5 at 1, 0.8, 0.5, 0.4 and 0.3 of one step.
         names, energy = [f"n0 = {n0:g}, μ = {mu0:g}, x0 = {x0:g}"], np.inf if end == PARADOX else 1e-4
         yield Case(names, standard(n0=n0, mu=mu0, x0=x0), 5.0, end, energy=energy)
     # Long after everything has settled, nothing may drift.
@@ -94,7 +95,7 @@ def rows(case: Case) -> Iterator[Row]:
     by = methods[0]
     step = automatic_step(by, MODELS["slip"], case.columns, 1e-10 if case.stiff else TOLERANCE)[0] / 2
     fine = simulate(case.columns, case.fine_end or case.t_end, method=by, step=step, settle=case.settle)
-    why = f"{by} at shorter steps" if case.spin is None else "theory"
+    why = f"{by} with shorter steps" if case.spin is None else "theory"
     end, near = (np.broadcast_to(each, len(case.names)) for each in (case.end, case.near))
     spin = fine["spin_final"] if case.spin is None else case.spin
     for method in methods:

@@ -1,4 +1,4 @@
-"""Time of whole runs against error in spin."""
+"""Measures the time of whole runs against the error in spin."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class Point:
 
 @dataclass(frozen=True)
 class Measured:
-    """A point, and the time of its runs in ms per trajectory."""
+    """Return a point, and the time of its runs in ms per trajectory."""
 
     point: Point
     cost: Spread
 
     @property
     def nanoseconds(self) -> float:
-        """Time of a step of one trajectory."""
+        """Return the time of a step of one trajectory."""
         return 1e6 * self.cost.median * self.point.step / T_END
 
 
@@ -62,7 +62,7 @@ def measure(effort: Effort) -> list[Measured]:
 
 
 def _groups() -> Iterator[tuple[str, str, str, Spins]]:
-    """Model, method, name and bodies: one group for each friction of the slip model, one for each other model."""
+    """Return model, method, name and bodies: one group for each friction of the slip model and each other model."""
     for model, method, reference in comparisons():
         if model != "slip":
             yield model, method, f"{len(reference.spins)} bodies", reference
@@ -73,7 +73,7 @@ def _groups() -> Iterator[tuple[str, str, str, Spins]]:
 
 
 def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort) -> Iterator[Point]:
-    """Shorter and shorter steps, until the error no longer falls."""
+    """Yield shorter and shorter steps, until the error stops falling."""
     kernel = make_kernel(method, MODELS[model], ())
     longest, _ = methods.automatic_step(method, MODELS[model], reference.columns, LOOSEST)
     many = spread_out(reference.columns, effort.trajectories)
@@ -107,7 +107,7 @@ def section(found: list[Measured], effort: Effort) -> Section:
 
 
 def at_equal_error(found: list[Measured]) -> Table:
-    """Compare the cheapest step of each method with an error up to `BOUND`."""
+    """Compare the cheapest step of each method whose error is at most `BOUND`."""
     best: dict[str, dict[str, float]] = {}
     for each in found:
         point = each.point

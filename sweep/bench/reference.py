@@ -1,4 +1,4 @@
-"""Reference spins, and errors against them.  The project's `data/README.md` says how they were made."""
+"""Loads reference spins, and compares results with them. The project's `data/README.md` says how they were made."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sweep.models import MODELS
 from sweep.parameters import PARAMETERS
 
 STEEPEST = 1e4
-"""Largest friction at which a method is run whose stability limits the step: its time is proportional to μ."""
+"""Largest friction for a method with a stability limit: its time is proportional to μ."""
 
 SPINS = resources.files("sweep.bench") / "data" / "reference_spins.csv"
 
@@ -29,16 +29,16 @@ class Spins:
     columns: dict[str, Array]
     """Physical parameters, each of shape (bodies,)."""
     times: Array
-    """All are multiples of the first."""
+    """Times, all multiples of the first."""
     spins: Array
     """Shape (bodies, times)."""
 
     def select(self, which: Array) -> Spins:
-        """Take the bodies chosen by `which`, a mask or indices."""
+        """Return the bodies selected by `which`, a mask or indices."""
         return Spins({n: v[which] for n, v in self.columns.items()}, self.times, self.spins[which])
 
     def is_standard(self, body: int) -> bool:
-        """Tell whether a body and its start are those of the standard case, at whatever friction."""
+        """Return whether body and start are those of the standard case, at whatever friction."""
         others = (name for name in self.columns if name != "mu")
         return all(self.columns[name][body] == PARAMETERS[name].default for name in others)
 
@@ -56,7 +56,7 @@ def read_spins() -> dict[str, Spins]:
 
 
 def comparisons() -> Iterator[tuple[str, str, Spins]]:
-    """Pair each model with each method that runs it, and those of its bodies that take the method a bearable time."""
+    """Pair each model with each method that runs it, and with the bodies that the method can run in reasonable time."""
     for model, reference in read_spins().items():
         for method in allowed(MODELS[model]):
             mu = reference.columns.get("mu", np.zeros(len(reference.spins)))
@@ -66,7 +66,7 @@ def comparisons() -> Iterator[tuple[str, str, Spins]]:
 def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
     """Find the largest error in spin over the reference's times, of shape (bodies,).
 
-    Each time gets a trajectory of its own, because the steps of adams depend on where it is to end.  The error of a
+    Each time needs a separate trajectory, because the steps of adams depend on where it is to end. The error of a
     trajectory that fails is infinite.
     """
     table = np.concatenate([kernel.images(reference.columns, step, t) for t in reference.times])
@@ -77,5 +77,5 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
 
 
 def whole_steps(reference: Spins, step: Array) -> Array:
-    """Find the longest steps, at most `step`, of which all times of the reference are multiples."""
+    """Find the longest steps, at most `step`, that divide all times of the reference."""
     return np.asarray(reference.times[0] / np.ceil(reference.times[0] / step * (1 - 1e-12)))

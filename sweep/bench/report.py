@@ -1,4 +1,4 @@
-"""The report: speed against error and the hard cases, as a page, a picture and a table of raw figures."""
+"""Writes the report: speed against error and the hard cases, as a page, a picture and a table of raw figures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HEAD = ("model", "method", "case", "step", "spin_error", "ms_median", "ms_smalle
 
 
 def bench(output: Path, note: Callable[[str], None] = lambda _: None, effort: Effort | None = None) -> list[Row]:
-    """Measure everything, write bench.csv, .png and .html to `output`, and return the hard cases that do not hold."""
+    """Measure everything, write bench.csv, .png and .html to `output`, and return the hard cases that fail."""
     began, effort = time.perf_counter(), effort or Effort()
     output.mkdir(parents=True, exist_ok=True)
     found = precision.measure(effort)

@@ -1,4 +1,4 @@
-"""How much to measure, and the times of works that take turns."""
+"""Defines how much to measure, and times tasks in turn."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Effort:
     trajectories: int = 512
     repeats: int = 5
     patience: float = 3.0
-    """Seconds after which a work that has run three times is not repeated again."""
+    """Seconds after which a task that has run three times is not repeated again."""
     rungs: int = 8
     """Number of steps to try, each shorter than the last by sqrt(2)."""
 
@@ -54,7 +54,7 @@ class Spread:
 
 
 def in_turn(works: Mapping[Key, Callable[[], Any]], effort: Effort) -> dict[Key, Spread]:
-    """Time each work, in seconds.  They run in turn, so that a change in the machine's speed affects all alike."""
+    """Time each task, in seconds. They run in turn, so that changes in the machine's speed affect all alike."""
     times: dict[Key, list[float]] = {name: [] for name in works}
     for _ in range(effort.repeats):
         for name, work in works.items():
@@ -81,7 +81,7 @@ class Work:
         return len(self.step)
 
     def affordable(self, effort: Effort) -> Work:
-        """Take the first of the trajectories, as many as should run in a third of the patience."""
+        """Return the first trajectories, as many as should run in a third of the patience."""
         count, seconds = len(self), nominal_seconds(T_END / self.step)
         while count > 2 * LANES and seconds > effort.patience / 3:
             count, seconds = count // 2, seconds / 2
@@ -89,6 +89,6 @@ class Work:
 
 
 def spread_out(columns: Columns, count: int) -> dict[str, Array]:
-    """Repeat the bodies of `columns` in `count` trajectories, whose spins are up to a thousandth apart."""
+    """Repeat the bodies of `columns` in `count` trajectories, whose spins differ by up to a thousandth."""
     many = {name: np.resize(values, count) for name, values in columns.items()}
     return many | {"n0": many["n0"] * (1 + 1e-3 * np.arange(count) / count)}

@@ -1,4 +1,4 @@
-"""The commands that write a configuration: `body` and `examples`."""
+"""The commands that help to write a configuration: `body`, `examples` and `parameters`."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ MEASURED: dict[str, tuple[Parameter, str]] = {
     "c": (PARAMETERS["c"], "Semi-axis of the surface, upright."),
     "angle": (PARAMETERS["delta"], "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0]."),
 }
-"""What can be measured: the parameter whose unit and bounds it has, and the help of its option."""
+"""The quantities that can be measured: the parameter that gives unit and bounds, and the help text of the option."""
 
 
 def _measured(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of what can be measured."""
+    """Add an option for each quantity that can be measured."""
     for name, (_, words) in reversed(MEASURED.items()):
         command = click.option(f"--{name.replace('_', '-')}", metavar="NUMBER[+-ERROR]UNIT", help=words)(command)
     return command
@@ -39,15 +39,14 @@ def _measured(command: Callable[..., None]) -> Callable[..., None]:
 
 @click.command()
 @_measured
-@click.option("--whole", is_flag=True, help="A whole ellipsoid, not its lower half, flat on top.")
-@click.option("--stl", type=PATH, help="STL file of the shape, in millimetres, z up as it stands on a table.")
+@click.option("--whole", is_flag=True, help="Use a whole ellipsoid instead of its lower half.")
+@click.option("--stl", type=PATH, help="STL file of the shape, in millimetres, z pointing up as it stands on a table.")
 def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
-    """Print a configuration of a rattleback that was measured.
+    """Print a configuration computed from measured dimensions.
 
-    It is a homogeneous solid, by default the lower half of an ellipsoid.  Lengths may be in m, cm, mm, in or ft.
-    Give the mass, and for each direction a size, a radius of curvature or a semi-axis; where there
-    are two, the size is that of the solid, the other that of the surface.  With --stl, give only the
-    mass or the density.
+    The body is a homogeneous solid, by default the lower half of an ellipsoid. Lengths may be in m, cm, mm, in or ft.
+    Give the mass, and for each direction a size, a radius of curvature or a semi-axis. If you give two, the size
+    describes the solid and the other describes the surface. With --stl, give only the mass or the density.
     """
     if stl and whole:
         refuse("--whole", "cannot be combined with --stl; leave out one of the two")
@@ -63,11 +62,11 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
 
 @click.command()
 @click.argument("name", required=False)
-@click.option("--output", type=PATH, default=".", help="Folder to copy it to [default: this one].")
+@click.option("--output", type=PATH, default=".", help="Folder to copy the example to [default: the current one].")
 def examples(name: str | None, output: Path) -> None:
-    """List the configurations that come with the package, or copy the one called NAME.
+    """List the examples of the package, or copy the example NAME.
 
-    Its model and a film of its body are copied as well, where it has them.  No file is overwritten.
+    The model file and film of an example are copied too, if it has any. No file is overwritten.
     """
     shipped = options.examples()
     if name is None:
@@ -81,8 +80,25 @@ def examples(name: str | None, output: Path) -> None:
     companions = [path for path in shipped[name].parent.glob(f"{name}*") if path.suffix != ".yaml"]
     for path in (copied := [shipped[name], *companions]):
         if (output / path.name).exists():
-            refuse(str(output / path.name), "exists already; choose another folder by --output")
+            refuse(str(output / path.name), "already exists; choose another folder with --output")
     output.mkdir(parents=True, exist_ok=True)
     for path in copied:
         shutil.copyfile(path, output / path.name)
         say(f"wrote {output / path.name}")
+
+
+@click.command()
+def parameters() -> None:
+    """List the parameters of a configuration.
+
+    Each takes a number, a list, a range such as {start: 20, stop: 200, num: 41, spacing: log}, or a distribution such
+    as {normal: [60, 5]}. The list gives units, defaults and bounds.
+    """
+    text = click.HelpFormatter(max_width=100)
+    text.write_dl([(p.path, _summary(p)) for p in PARAMETERS.values()])
+    say(text.getvalue().rstrip())
+
+
+def _summary(parameter: Parameter) -> str:
+    default = "" if parameter.default is None else f"default {parameter.default:g}"
+    return "; ".join(filter(None, [parameter.meaning, default, parameter.bounds(1e3)]))

@@ -1,4 +1,4 @@
-"""Checks environment variables with which Numba would fail, after a warning or a traceback of its own."""
+"""Checks environment variables that would make Numba fail with a warning or a traceback."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ _ALLOWED = {
     "NUMBA_DISABLE_JIT": ("[01]", "0 or 1"),
     "NUMBA_THREADING_LAYER": ("|".join(_LAYERS), either(_LAYERS)),
 }
-"""A pattern of what each may be, and the same in words."""
+"""The pattern of permitted values of each variable, and a description of it for messages."""
 
 _POOLS = {"tbb": "numba.np.ufunc.tbbpool", "omp": "numba.np.ufunc.omppool"}
-"""The modules of Numba that need a library which may be missing, by threading layer."""
+"""The modules of Numba that need an optional library, by threading layer."""
 
 
 def check() -> None:
-    """Raise a `ConfigError` for the first variable that is set to what Numba does not take."""
-    for name, (pattern, words) in _ALLOWED.items():
+    """Raise a `ConfigError` for the first variable whose value Numba does not accept."""
+    for name, (pattern, wanted) in _ALLOWED.items():
         if (given := os.environ.get(name, "").strip()) and not re.fullmatch(pattern, given):
-            refuse(name, refusal(given, words))
+            refuse(name, refusal(given, wanted))
     layer = os.environ.get("NUMBA_THREADING_LAYER", "").strip()
     if pool := _POOLS.get(layer):
         try:

@@ -1,4 +1,4 @@
-"""End commands: with exit codes, and with errors as lines that a user can act on."""
+"""Ends commands with an exit code, and reports errors as lines that a user can act on."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from sweep.parameters import Parameter
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 CLOSED_PIPE = 141
-"""As the shell reports any command that SIGPIPE ends: what read its output, such as `head`, has enough."""
+"""Exit code that shells report for a command ended by SIGPIPE, as when `head` has read enough of its output."""
 
 
 def say(text: str, *, err: bool = False) -> None:
-    """Print lines that may quote files and their names."""
+    """Print lines that may quote files and their names, with control characters escaped."""
     click.echo("\n".join(map(printable, text.split("\n"))), err=err)
 
 
 def refuse(option: str | Path, message: str) -> NoReturn:
-    """Raise the fault of an option, or of a file."""
+    """Raise a `ConfigError` about an option or a file."""
     raise fault_of(message, file=str(option))
 
 
 @contextmanager
 def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
-    """Name `option` in faults of the parameters that it gave."""
+    """Prefix `option` to faults of parameters that were given by that option."""
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)
@@ -49,7 +49,7 @@ def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
 
 
 def _in_options(error: ConfigError, command: click.Command) -> ConfigError:
-    """Name the options of a command in faults of the arguments that they gave."""
+    """Name the option in faults of an argument that was given on the command line."""
     options = {name: each.opts[0] for each in command.params if isinstance(each, click.Option)
                for name in (each.name, each.opts[0].lstrip("-"))}  # fmt: skip
 
@@ -62,7 +62,7 @@ def _in_options(error: ConfigError, command: click.Command) -> ConfigError:
 
 @contextmanager
 def needs_bokeh(what: str) -> Iterator[None]:
-    """Make a missing Bokeh a fault that tells how to install it."""
+    """Turn a missing Bokeh into an error that explains how to install it."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -76,16 +76,16 @@ _FULL = {errno.ENOSPC, errno.EDQUOT}
 
 
 def _of_user(error: OSError) -> bool:
-    """Tell whether the user can mend an error of the system: it names a file that is not ours, or a disk is full."""
+    """Return whether the user can fix a system error: it names a file outside the package, or a disk is full."""
     if error.filename is None:
         return error.errno in _FULL
     return not Path(str(error.filename)).is_relative_to(_PACKAGE)
 
 
 class Commands(click.Group):
-    """Commands whose errors, where the user can mend them, become lines on stderr and an exit code.
+    """A group of commands that prints errors the user can fix as lines on stderr, and sets the exit code.
 
-    All others are ours, and show their traceback.
+    All other errors are bugs and show their traceback.
     """
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -93,14 +93,14 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except click.NoSuchOption as error:
             verb = error.ctx.info_name if error.ctx else ""
-            if not (words := ended(error.option_name, f"{verb} {error.option_name}")):
+            if not (reason := ended(error.option_name, f"{verb} {error.option_name}")):
                 raise
-            say(f"{error.option_name}: {words}", err=True)
+            say(f"{error.option_name}: {reason}", err=True)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)
         except BrokenPipeError:
-            # What is left in the buffers when Python ends goes nowhere.
+            # Discard what is left in the buffers when Python ends.
             for stream in (sys.stdout, sys.stderr):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
             sys.exit(CLOSED_PIPE)

@@ -1,4 +1,4 @@
-"""Arguments and options that commands share, and what their texts mean."""
+"""Arguments and options that several commands share, and how their values are read."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def examples() -> dict[str, Path]:
 
 
 def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> list[CompletionItem]:
-    """The keys of a configuration, or with `--at` the parameters, that go on from what was typed."""
+    """Complete a key of a configuration, or the name of a parameter for `--at`."""
     from sweep.config.schema import PATHS
 
     known = PATHS if parameter.name == "settings" else {p.name: p.meaning for p in PARAMETERS.values()}
@@ -44,12 +44,12 @@ QUIET = click.option("--quiet", is_flag=True, help="Print only errors.")
 
 
 def report_folder(default: str) -> Callable[[Any], Any]:
-    """The option `--output` of a command that writes a report."""
+    """Return the option `--output` of a command that writes a report."""
     return click.option("--output", type=PATH, default=default, show_default=True, help="Folder for the report.")
 
 
 def configured(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the argument CONFIG and the option `--set` to a command, which gets the configuration with these values."""
+    """Add the argument CONFIG and the option `--set` to a command, which receives the loaded configuration."""
 
     @wraps(command)
     def call(config: Path, settings: tuple[str, ...], **options: Any) -> None:
@@ -74,11 +74,11 @@ def loaded(config: Path, settings: tuple[str, ...]) -> Config:
 
 
 announce = partial(say, err=True)
-"""Said even with --quiet: code of a user never runs unseen."""
+"""Print a note on stderr even with --quiet: user code never runs unannounced."""
 
 
 def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """The values of `--at` by parameter, such as 60 or "12 cm"."""
+    """Return the values of `--at` by parameter, such as 60 or "12 cm"."""
     from sweep.config.document import number
 
     given: dict[str, list[float | str]] = {}

@@ -16,9 +16,9 @@ from sweep.cli.options import report_folder
 @click.command()
 @report_folder("runs/reproduce")
 def reproduce(output: Path) -> None:
-    """Compare the numbers and figures of Takano (2011) with ours, in one HTML report.
+    """Recompute the numbers and figures of Takano (2011).
 
-    Exit code 0 if every row holds, else 1.
+    Writes one HTML report, which compares them with the paper. The exit code is 0 if every row agrees, 1 otherwise.
     """
     from sweep.reproduce import reproduce as compare
 
@@ -28,11 +28,10 @@ def reproduce(output: Path) -> None:
 @click.command()
 @report_folder("runs/bench")
 def bench(output: Path) -> None:
-    """Measure speed against error for every method and model, and run hard cases.
+    """Measure speed against error, and run hard cases.
 
-    Takes about two minutes on two cores; writes bench.html, bench.png and bench.csv.
-
-    Exit code 1 if a hard case does not hold, else 0: speed and error are reported, not judged.
+    Covers every method and model. Takes about two minutes on two cores; writes bench.html, bench.png and bench.csv. The
+    exit code is 0 if all hard cases pass, 1 otherwise; speed and error are reported but not judged.
     """
     from sweep.bench import bench as measure
 
@@ -40,7 +39,7 @@ def bench(output: Path) -> None:
 
 
 def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path, files: str, rows: str) -> NoReturn:
-    """Write a report, its `files` in the folder `output`, and end by whether all of its `rows` hold."""
+    """Write a report, whose `files` go to the folder `output`, and exit with an error unless all of its `rows` hold."""
     from sweep.progress import Terminal
     from sweep.results.writing import require_writable
 

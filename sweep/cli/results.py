@@ -18,38 +18,38 @@ from sweep.plots import formats
 
 @click.command()
 @FILE
-@click.option("--var", "variable", help="Variable to draw [default: the first picture that its configuration names, or "
-              "else the reversals, beside their prediction].")  # fmt: skip
+@click.option("--var", "variable", help="Variable to draw [default: the first picture named in the configuration, or "
+              "else the reversals, next to their prediction].")  # fmt: skip
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
 @click.option("--sel", "cells", multiple=True, metavar="NAME=VALUE",
               help="Draw only the cells nearest to this value of a parameter, e.g. n0=0.05 (repeatable).")  # fmt: skip
 @click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
-@click.option("--cmap", metavar="NAME", help="A colour map of matplotlib, such as viridis.")
+@click.option("--cmap", metavar="NAME", help="A matplotlib colour map, such as viridis.")
 @click.option("--width", metavar="LENGTH",
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
-@click.option("--no-title", is_flag=True, help="Draw no title.")
+@click.option("--no-title", is_flag=True, help="Leave out the title.")
 @click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.A_PICTURE} "
               "[default: a PNG beside FILE, named after FILE and the options].")  # fmt: skip
 def plot(
     file: Path, variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool, output: Path | None,
     **how: Any,
 ) -> None:  # fmt: skip
-    """Draw a dataset: maps or curves of a run, trajectories, critical spins, or boundaries."""
+    """Draw maps, curves, trajectories, critical spins or boundaries."""
     sel = dict[str, float]()
     for cell in cells:
         name, value = parse_pair(cell, "--sel")
         if sel.setdefault(name, value) != value:
-            refuse(f"--sel {brief(cell)}", f"{name} has another value already; draw one picture for each")
+            refuse(f"--sel {brief(cell)}", f"{name} is given twice; draw one picture for each value")
     span = parse_span(limits, "--limits") if limits is not None else None
     from sweep.plots import panels, picture
     from sweep.results.kind import opened
 
     interrupt.raise_again()
-    # The picture without options is the run's own: with others it gets a name of its own.
+    # The picture drawn without options belongs to the run; any other gets its own name.
     asked = [f"{name}={value}" for name, value in {**how, "limits": limits}.items() if value]
-    words = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
-    target = output or file.with_name(f"{'_'.join(filter(None, words))}.png".replace("/", "-"))
+    parts = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
+    target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
     dataset = opened(file)
     picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
     for name, taken in panels.nearest(dataset, sel).items():
@@ -59,24 +59,26 @@ def plot(
 
 @click.command()
 @FILE
-def info(file: Path) -> None:
-    """Show what is in a dataset: axes, counts, agreement with the prediction, provenance."""
+@click.option("--all", "whole", is_flag=True, help="Add meanings, units, all attributes and the configuration.")
+def info(file: Path, whole: bool) -> None:
+    """Summarise the results, accuracy and contents of a dataset."""
     from sweep.results.kind import opened
-    from sweep.results.summary import contents, describe
+    from sweep.results.summary import contents, describe, overview
 
     dataset = opened(file)
-    say("\n".join([str(dataset.attrs.get("title", file.name)), describe(dataset), contents(dataset)]))
+    lines = [str(dataset.attrs.get("title", file.name)), describe(dataset), overview(dataset)]
+    say("\n".join([*lines, contents(dataset)] if whole else lines))
 
 
 @click.command()
 @FILE
-@click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free from 5006].")
-@click.option("--no-browser", is_flag=True, help="Print the address and open no browser.")
-@click.option("--model", help="The Python file or entry point of the dataset's own model, whose code is run.")
+@click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free one from 5006].")
+@click.option("--no-browser", is_flag=True, help="Print the address without opening a browser.")
+@click.option("--model", help="Python file or entry point of the user-defined model of the dataset; its code is run.")
 def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -> None:
     """Explore the maps of a dataset in the browser.
 
-    A click on a cell runs its trajectory.  Only this machine can open the page; Ctrl-C ends it.
+    Click a cell to run its trajectory. The page can be opened only on this machine; press Ctrl-C to stop.
     """
     with needs_bokeh("explore"):
         from sweep.explorer.server import serve
@@ -88,4 +90,4 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
     serve(source, setup, port, browser=not no_browser, say=say)
     say("stopped")
     sys.stdout.flush()
-    os._exit(DONE)  # a trajectory that is running cannot be interrupted, and nothing is lost with it
+    os._exit(DONE)  # A running trajectory cannot be interrupted, and stopping loses nothing

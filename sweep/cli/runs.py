@@ -13,7 +13,6 @@ import click
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
 from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured, loaded
 from sweep.interrupt import INTERRUPTED
-from sweep.parameters import PARAMETERS
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, DEVIATIONS, SPIN_WIDTH, WIDTHS
 
 if TYPE_CHECKING:
@@ -21,50 +20,41 @@ if TYPE_CHECKING:
 
     from sweep.config import Config
     from sweep.results.folder import RunFiles
-    from sweep.studies.kept import Task
+    from sweep.studies.study import Task
 
 
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 
 
-def _parameter_help() -> str:
-    """The table of parameters as help text."""
-    lines = ["\b", "Parameters (a number, a list, or {start, stop, num, spacing: linear|log}):"]
-    for p in PARAMETERS.values():
-        default = "no default" if p.default is None else f"default {p.default:g}"
-        lines.append(f"  {p.path:24} {p.meaning}; {default}; {p.allowed}")
-    return "\n".join(lines)
-
-
 DRY_RUN = click.option(
-    "--dry-run", is_flag=True, help="Print how much would be simulated, and about how long it takes; compute nothing."
+    "--dry-run", is_flag=True, help="Print how much would be simulated and roughly how long it would take, then stop."
 )
 AT = click.option(
     "--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun,
-    help="A parameter of the cell, e.g. --at mu=60 --at b=3; given twice, it makes two runs.",
+    help="Parameter of the cell to follow, e.g. --at mu=60 --at b=3; repeat a parameter to follow several cells.",
 )  # fmt: skip
-FRESH = click.option("--fresh", is_flag=True, help="Discard what an earlier run left instead of resuming it.")
+FRESH = click.option("--fresh", is_flag=True, help="Discard the files of an earlier run instead of resuming it.")
 
 
 def _resumed(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a command whose simulations are kept, resumed, and spread over processes."""
+    """Add the options of commands that keep their simulations, resume, and can use several processes."""
     for option in (QUIET, SCHEDULER, FRESH, DRY_RUN, OUTPUT):
         command = option(command)
     return command
 
 
-@click.command(epilog=_parameter_help())
+@click.command()
 @configured
 @click.option("--rerun", type=click.Choice(["failed", "limit"]),
-              help="Simulate again only those cells of the dataset that failed, or that reached t_end.")  # fmt: skip
+              help="Repeat only the cells of the dataset that failed, or that reached t_end.")  # fmt: skip
 @_resumed
 def run(config: Config, rerun: str | None, **how: Any) -> None:
     """Run the sweep that CONFIG describes.
 
-    Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run, and a
-    NAME_VARIABLE.png for each further variable that CONFIG names under `picture`.  If it is
-    interrupted, finished work is kept, and the same command resumes the run.  If CONFIG has since
-    got more values along an axis, or a later t_end, only what the dataset lacks is simulated.
+    Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run, and NAME_VARIABLE.png for
+    each further variable listed under `picture` in CONFIG. An interrupted run keeps finished work, and the same command
+    resumes it. If you have added values to an axis of CONFIG or raised t_end, only the missing part is simulated.
+    `sweep parameters` lists the parameters.
     """
     from sweep.engine.estimate import estimate
     from sweep.engine.run import run as run_sweep
@@ -84,9 +74,9 @@ def run(config: Config, rerun: str | None, **how: Any) -> None:
 @configured
 @AT
 @click.option("--stop-when-settled", is_flag=True,
-              help="End when neither spin nor count can change any more, as a sweep does, not at t_end.")  # fmt: skip
+              help="Stop once spin and count can no longer change, as a sweep does, instead of at t_end.")  # fmt: skip
 @click.option("--samples", type=click.IntRange(1), metavar="N",
-              help="Follow N samples of the uncertain parameters, not their medians.")  # fmt: skip
+              help="Follow N samples of the uncertain parameters instead of their medians.")  # fmt: skip
 @OUTPUT
 @DRY_RUN
 @QUIET
@@ -94,13 +84,13 @@ def trajectory(
     config: Config, cells: tuple[str, ...], samples: int | None, output: Path | None, dry_run: bool, quiet: bool,
     **how: Any,
 ) -> None:  # fmt: skip
-    """Follow single cells of CONFIG densely in time, up to its t_end.
+    """Follow individual cells with dense output.
 
-    Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact point, slip,
-    normal force, energy and the work of friction.  Several trajectories are drawn over each other; of samples,
-    the spins alone.
+    They run to t_end of CONFIG. Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact
+    point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for
+    samples, only the spins are drawn.
     """
-    at = cells_of(cells, config.table)  # which takes no time; what is loaded then takes a second
+    at = cells_of(cells, config.table)  # first, since the imports that follow take a second
     if dry_run:
         from sweep.studies.trajectory import estimate
 
@@ -118,31 +108,31 @@ def trajectory(
 @SETTINGS
 @AT
 @click.option("--from", "begin", type=float, default=0.0, show_default=True, help="Time at which the clip begins.")
-@click.option("--to", "end", type=float, help="Time at which it ends [default: some time after the first reversal].")
+@click.option("--to", "end", type=float, help="Time at which the clip ends [default: soon after the first reversal].")
 @click.option("--speed", type=click.FloatRange(0, min_open=True),
-              help="Time shown in a second [default: such that the clip takes ten].")  # fmt: skip
+              help="Time shown per second of the clip [default: such that the clip takes 10 s].")  # fmt: skip
 @click.option(
     "--output",
     type=PATH,
-    help="gif, mp4 or html to write [default: NAME_trajectory.gif in runs/NAME, or beside FILE].",
+    help="File to write: gif, mp4 or html [default: NAME_trajectory.gif in runs/NAME, or next to FILE].",
 )
 @QUIET
 def animate(
     source: Path, settings: tuple[str, ...], cells: tuple[str, ...], begin: float, end: float | None,
     speed: float | None, output: Path | None, quiet: bool,
 ) -> None:  # fmt: skip
-    """Show how single bodies turn, and their contact points' paths on the table.
+    """Animate bodies and the paths of their contact points.
 
-    The bodies are those of CONFIG, or of a FILE that `sweep trajectory` wrote (NAME_trajectory.nc).  Of a FILE that
-    `sweep fit` wrote (NAME_fit.nc), they are the filmed body and the fitted one.  They are shown side by side on a
-    common clock, above their spin curves.  A page (html) opens without network; an mp4 needs ffmpeg.
+    CONFIG describes the bodies; FILE is a dataset written by `sweep trajectory` (NAME_trajectory.nc) or by `sweep fit`
+    (NAME_fit.nc), which shows the filmed body and the fitted one. Bodies are shown side by side on a common clock,
+    above their spin curves. An html page needs no network; an mp4 needs ffmpeg.
     """
     from sweep.plots import animation
     from sweep.results.writing import require_writable
 
     of_file = animation.is_dataset(source)
     if of_file and (settings or cells):
-        refuse("--set" if settings else "--at", "not for a dataset; give the configuration in its place")
+        refuse("--set" if settings else "--at", "cannot be used with a dataset; give the configuration instead")
     config = None if of_file else loaded(source, settings)
     usual = Path("runs") / config.name / f"{config.name}_trajectory.gif" if config else source.with_suffix(".gif")
     target = output or usual
@@ -172,16 +162,16 @@ def animate(
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
 @click.option("--bracket", type=click.FloatRange(*WIDTHS), default=BOUNDARY_WIDTH, show_default=True,
-              help="Relative distance of the two simulated cells between which a count changes.")  # fmt: skip
+              help="Relative distance between the two simulated cells on either side of a boundary.")  # fmt: skip
 @click.option("--deviation", type=click.FloatRange(*DEVIATIONS), default=BOUNDARY_DEVIATION, show_default=True,
-              help="Distance of a curve from its boundary between two points, in lengths of the axes.")  # fmt: skip
+              help="Maximum interpolation error of a curve, as a fraction of the axis length.")  # fmt: skip
 @_resumed
 def boundaries(config: Config, x: str | None, y: str | None, bracket: float, deviation: float, **how: Any) -> None:
-    """Find the curves over two axes of CONFIG on which the number of reversals changes.
+    """Find the curves on which the number of reversals changes.
 
-    The cells of the grid tell where the curves pass, and further simulations how exactly: each point lies between
-    two simulated cells.  Writes NAME_boundaries.nc and .png.  If it is interrupted, finished simulations are kept,
-    and the same command resumes the search.
+    The grid of CONFIG locates the curves over two of its axes; further simulations refine them, so that each point lies
+    between two simulated cells. Writes NAME_boundaries.nc and .png. An interrupted search keeps finished simulations,
+    and the same command resumes it.
     """
     from sweep.studies.boundaries import boundaries as search
 
@@ -194,11 +184,10 @@ def boundaries(config: Config, x: str | None, y: str | None, bracket: float, dev
               help="Relative width of the brackets of n_c2.")  # fmt: skip
 @_resumed
 def critical(config: Config, bracket: float, **how: Any) -> None:
-    """Find the critical spins over all axes of CONFIG but n0.
+    """Find the critical spins over all axes of CONFIG except n0.
 
-    They come from the paper's formulas, n_c1 also from the model's eigenvalues, and n_c2 from simulation.
-    Writes NAME_critical.nc and .png.  If it is interrupted, finished simulations are kept, and the
-    same command resumes the search.
+    All are given by the paper's formulas; n_c1 also comes from the model's eigenvalues, and n_c2 from simulation.
+    Writes NAME_critical.nc and .png. An interrupted search keeps finished simulations, and the same command resumes it.
     """
     from sweep.studies.critical import critical as search
 
@@ -209,11 +198,11 @@ def critical(config: Config, bracket: float, **how: Any) -> None:
 @configured
 @_resumed
 def indices(config: Config, **how: Any) -> None:
-    """Tell on which of the uncertain parameters of CONFIG its results depend.
+    """Compute Sobol sensitivity indices of the uncertain parameters.
 
-    CONFIG is of one scene, with a distribution for each parameter that is uncertain.  Sobol indices say how much of the
-    variance of counts and times comes from each.  Writes NAME_indices.nc and .png.  If it is interrupted, finished
-    simulations are kept, and the same command resumes.
+    CONFIG must describe a single body and start, with a distribution for each uncertain parameter. The indices give
+    each parameter's share of the variance of counts and times. Writes NAME_indices.nc and .png. An interrupted run
+    keeps finished simulations, and the same command resumes it.
     """
     from sweep.studies.indices import indices as find
 
@@ -223,7 +212,7 @@ def indices(config: Config, **how: Any) -> None:
 @click.command()
 @configured
 @click.argument("film", type=PATH)
-@click.option("--free", required=True, metavar="NAME,NAME", help="The parameters to find, e.g. mu,sigma,n0,x0,y0.")
+@click.option("--free", required=True, metavar="NAME,NAME", help="Parameters to fit, e.g. mu,sigma,n0,x0,y0.")
 @click.option("--laws", metavar="NAME,NAME", help="Laws of friction to fit and compare, e.g. viscous,coulomb.")
 @click.option("--time-column", default="", metavar="NAME", help="Column of the time, e.g. 'clock (ms)'.")
 @click.option("--spin-column", default="", metavar="NAME",
@@ -236,11 +225,12 @@ def fit(
 ) -> None:  # fmt: skip
     """Find the parameters of the body in CONFIG that reproduce FILM.
 
-    FILM is a table with a header: a time, and a spin, a gyroscope's reading or a heading, such as "Time (s), Gyroscope
-    z (rad/s)".  A free parameter with several values in CONFIG is sought between the least and the largest; the range
-    of one with a single value is found from the film.  Of the film itself, film_delay and film_bias can be free.
-    Three sentences say whether the fit is to be believed.  Writes NAME_fit.nc and .png, and
-    NAME_fit.yaml, which runs the fitted body; with --laws, NAME_laws.nc, .png and .yaml, that of the best law.
+    FILM is a table with a header: a time, and a spin, a gyroscope reading or a heading, such as "Time (s), Gyroscope z
+    (rad/s)". A free parameter with several values in CONFIG is sought between the smallest and the largest; the range
+    of a free parameter with a single value is found from the film. The offsets film_delay and film_bias of the film
+    itself can also be free. Three sentences say whether the fit can be trusted. Writes NAME_fit.nc and .png, and
+    NAME_fit.yaml, which runs the fitted body; with --laws, writes NAME_laws.nc, .png and .yaml, the last for the best
+    law.
     """
     from sweep.progress import Terminal
     from sweep.results.summary import describe
@@ -257,18 +247,18 @@ def fit(
 
 
 def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr.Dataset:
-    """Follow the cells of `--at`, and say which values axes take that it does not name."""
+    """Follow the cells of `--at`, and report the value taken on each axis that it leaves out."""
     from sweep.progress import Terminal
     from sweep.studies.trajectory import first_values, trajectory
 
     with Terminal(quiet) as terminal, of_option("--at", config.table):
-        if words := first_values(config, at):
-            terminal.note(words)
+        if message := first_values(config, at):
+            terminal.note(message)
         return trajectory(config, reporter=terminal, **how, **at)
 
 
 def _files(config: Config, verb: str, output: Path | None) -> RunFiles:
-    """Where a command without a checkpoint writes; `StoreError`, before it computes anything, if it cannot."""
+    """Return the files of a command without a checkpoint, after checking that they can be written."""
     from sweep.results.folder import RunFiles
 
     files = RunFiles(output or Path("runs") / config.name, f"{config.name}_{verb}")
@@ -287,18 +277,18 @@ def _save(result: xr.Dataset, files: RunFiles) -> None:
 
 
 def _studied(task: Task, **how: Any) -> None:
-    """Carry out a study, as `_written`."""
+    """Carry out a study and report the result, as `_written`."""
     from sweep.studies import estimates
-    from sweep.studies.kept import kept
+    from sweep.studies.study import run_study
 
-    _written(task.config, task.verb, partial(kept, task), partial(estimates.of, task), **how)
+    _written(task.config, task.verb, partial(run_study, task), partial(estimates.of, task), **how)
 
 
 def _written(
     config: Config, verb: str, work: Callable[..., xr.Dataset], estimate: Callable[[], str], *,
     fresh: bool, dry_run: bool, output: Path | None, scheduler: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
-    """Carry out `work`, show its progress, and say what it found and wrote; of a dry run, only the estimate."""
+    """Carry out `work`, show its progress, and report result and files; in a dry run print only the estimate."""
     if dry_run:
         click.echo(estimate())
         return None
@@ -324,6 +314,6 @@ def _written(
 
 
 def _stamps(folder: Path, name: str) -> dict[str, tuple[int, int]]:
-    """Return marks, by suffix, that change when the results `name` in `folder` are written anew."""
+    """Return marks, by suffix, that change whenever a result file `name` in `folder` is rewritten."""
     found = [path for ending in (".nc", ".png", "_*.png") for path in sorted(folder.glob(f"{name}{ending}"))]
     return {path.name.removeprefix(name): (path.stat().st_ino, path.stat().st_mtime_ns) for path in found}

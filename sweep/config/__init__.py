@@ -1,4 +1,4 @@
-"""From a YAML file to a checked `Config`."""
+"""Turns a YAML file into a checked `Config`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sweep.config import cases, cross_checks, document, film, schema, user_model
 from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of, present
 from sweep.config.distributions import drawn
 from sweep.config.document import plain_data
-from sweep.config.messages import describe
+from sweep.config.messages import explain
 from sweep.config.schema import Integrator
 from sweep.config.values import Values, in_si
 from sweep.faults import ConfigError, Fault
@@ -38,7 +38,7 @@ from sweep.units import SI, TIME
 __all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
 
 ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
-"""A configuration is given as itself, as what its file says, or as the path of that file."""
+"""A configuration, a mapping with the contents of its file, or the path of the file."""
 
 
 def load_config(
@@ -46,25 +46,25 @@ def load_config(
     overrides: Mapping[str, Any] | None = None,
     *,
     argument: Callable[[str], str] = str,
-    announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
+    announce: Callable[[str], None] | None = lambda message: None,  # noqa: ARG005
 ) -> Config:
     """Read and check a configuration.
 
-    If its model is a file or an entry point, the code of that runs.
+    If the model is a file or an entry point, its code is run.
 
     Parameters
     ----------
-    config : path of a YAML file, what such a file says as a mapping, or a configuration.  An axis of a mapping may be
+    config : path of a YAML file, its contents as a mapping, or a configuration.  An axis of a mapping may be
         a list, tuple, range, NumPy array or `xarray.DataArray`, and `cases` a `pandas.DataFrame`
     overrides : values that replace those of `config`, by path ("friction.mu") or, for a parameter or a setting of the
         integrator, by bare name ("mu")
-    argument : what faults call the override of this key
-    announce : told in words that code of a user is about to run; None if such a model is to be refused
+    argument : function that returns the name of an override in error messages
+    announce : called with a message before user code runs; None to refuse user-defined models
 
     Raises
     ------
     ConfigError
-        with a `Fault` for each thing that is wrong.
+        with a `Fault` for each error.
     """
     if isinstance(config, Config) and not overrides:
         return config
@@ -74,20 +74,20 @@ def load_config(
         source.set(_full_path(key, known), plain_data(value), argument(key))
     if isinstance(table := source.values.get("cases"), dict):
         source.known["cases", "cases"], source.values["cases"] = cases.of_columns(source, table, known), "cases"
-    # A name made from the file's must not be refused, since the user did not choose it.
+    # A name derived from the file name must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
     kind = schema.schema_of(origin)
     try:
         values = kind.model_validate(source.values)
     except ValidationError as error:
-        found = describe(error.errors(), kind).items()
+        found = explain(error.errors(), kind).items()
         raise ConfigError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
     return _resolve(values, source, origin)
 
 
 def parameters_of(config: ConfigLike, overrides: Mapping[str, Any]) -> Mapping[str, Parameter]:
-    """Return the parameters that a configuration with these overrides may name; errors as of `load_config`."""
+    """Return the parameters that a configuration with these overrides may name; raises as `load_config`."""
     if isinstance(config, Config) and "model" not in overrides:
         return config.table
     return loading.table(_opened(config, overrides)[1])
@@ -97,17 +97,17 @@ def _opened(
     config: ConfigLike,
     overrides: Mapping[str, Any],
     argument: Callable[[str], str] = str,
-    announce: Callable[[str], None] | None = lambda words: None,  # noqa: ARG005
+    announce: Callable[[str], None] | None = lambda message: None,  # noqa: ARG005
 ) -> tuple[document.Document, Origin | None]:
-    """Open the document of a configuration, and tell where its model comes from if a user brings it."""
+    """Open the document of a configuration, and load its model if it is user-defined."""
     source = _source(config)
-    for key in {"model", "model_sha256"} & set(overrides):  # what the code to run depends on
+    for key in {"model", "model_sha256"} & set(overrides):  # on which the code to run depends
         source.set((key,), plain_data(overrides[key]), argument(key))
     return source, user_models.named(source, announce)
 
 
 def _source(config: ConfigLike) -> document.Document:
-    """Return the document of a configuration, to be changed freely."""
+    """Return the document of a configuration as a copy that may be changed."""
     if isinstance(config, Mapping):
         return document.Document("", plain_data(config))
     if not isinstance(config, Config):
@@ -124,14 +124,14 @@ def _source(config: ConfigLike) -> document.Document:
 
 
 def _full_path(key: str, known: Mapping[str, Parameter]) -> tuple[str, ...]:
-    """Return the path at which the value of an override belongs."""
+    """Return the path of the value that an override replaces."""
     if key in known:
         return known[key].place
     return ("integrator", key) if key in Integrator.model_fields else tuple(key.split("."))
 
 
 def _resolve(values: Any, source: document.Document, origin: Origin | None) -> Config:
-    """Fill in defaults, order the axes, and check that everything fits together."""
+    """Fill in defaults, order the axes, and check that all values fit together."""
     known = loading.table(origin)
     given = _given(values, source, known)
     columns: cases.Columns = {}
@@ -178,18 +178,18 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
 
 
 def _pictures(values: Any, source: document.Document) -> tuple[str, ...]:
-    """The variables to be drawn; those of a file are not of what is measured in place of its measurements."""
+    """Return the variables to draw; those of a file apply only to what is measured there."""
     other = ("measure",) in source.arguments and ("picture",) not in source.arguments
     return () if other else tuple(values.picture or ())
 
 
 def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -> None:
     if found := list(misfits):
-        raise ConfigError(source.fault(path, words, at_key=True) for path, words in found)
+        raise ConfigError(source.fault(path, message, at_key=True) for path, message in found)
 
 
 def _given(values: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:
-    """Collect the physical parameters that the document names, in its order."""
+    """Collect the physical parameters that the document names, in document order."""
     found: dict[str, Values] = {}
     for key, value in source.values.items():
         if key in sections(known):
@@ -197,23 +197,23 @@ def _given(values: Any, source: document.Document, known: Mapping[str, Parameter
         elif key in known:
             found[key] = getattr(values, key)
     if known is PARAMETERS and "offset" not in present(found):
-        found.pop("offset", None)  # it does not make a body other than the paper's
+        found.pop("offset", None)  # the default, which is the paper's body
     return found
 
 
 def _written(
     source: document.Document, given: Mapping[str, Values], known: Mapping[str, Parameter]
 ) -> dict[faults.Path, str]:
-    """Collect the units that the document gives to values, by path."""
+    """Collect the units given with values, by path."""
     found = {known[name].place: value.unit for name, value in given.items() if value.unit}
     settings = source.values.get("integrator", {}).items()
     return found | {("integrator", name): unit for name, raw in settings if (unit := in_si(TIME, raw)[1])}
 
 
 def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physics:
-    """Collect what a configuration that names these parameters says beside numbers."""
+    """Collect the non-numeric settings of a configuration that names these parameters."""
     made = loading.load(origin) if origin else None
-    if isinstance(made, Model):  # of any body: it says its units itself
+    if isinstance(made, Model):  # a user's model gives the units itself
         return Physics(made.units, LAWS[PAPER_LAW], ELLIPSOID, names)
     law = made.law if made else LAWS[values.friction.name]
     return Physics(values.units, law, SURFACES[values.body.surface], names)
@@ -222,9 +222,9 @@ def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physi
 def _parameters(
     model: Tier, given: Mapping[str, Values], columns: Collection[str], known: Mapping[str, Parameter], physics: Physics
 ) -> dict[str, Values]:
-    """Order the parameters of the model as axes, with defaults; columns of the table and missing ones are left out."""
+    """Return the parameters of the model as axes in order, without columns of the table and missing ones."""
     found = {}
-    # Distributions keep the order of the document, in which they are drawn.
+    # Distributions keep the order of the document, which is the order of drawing.
     first = [name for name in FIRST_AXES if not (name in given and given[name].distribution)]
     order = dict.fromkeys((*first, *given, *model.parameters))
     for name in (name for name in order if name in model.parameters):
@@ -237,9 +237,9 @@ def _parameters(
 
 
 def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]) -> Integrator:
-    """Fill in the settings of the integrator whose defaults depend on the rest.
+    """Fill in the settings of the integrator whose defaults depend on other settings.
 
-    `in_si` are the numbers of all parameters if they are in SI; the default time is then in seconds.
+    `in_si` holds the values of all parameters if they are in SI; the default time is then in seconds.
     """
     integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
     asked = [spec.partition("=")[0] for spec in values.measure or ()]
@@ -259,5 +259,5 @@ def _longest(time: float, in_si: Mapping[str, tuple[float, ...]]) -> float:
     if not {"c", "gravity"} <= in_si.keys():
         return time
     longest = time * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
-    # In whole stretches, so that steps do not depend on it (`sweep.kernels.kernel.STRETCH`).
+    # A whole number of stretches, so that the steps do not depend on the limit (`sweep.kernels.kernel.STRETCH`).
     return float(STRETCH * ceil(min(longest, schema.LATEST) / STRETCH))

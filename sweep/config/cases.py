@@ -1,4 +1,4 @@
-"""Tables of cases, with a column per parameter and a row per trajectory: CSV files, or lists by column."""
+"""Reads tables of cases, with a column per parameter and a row per trajectory: CSV files, or lists by column."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from sweep.parameters import Parameter
 from sweep.units import ANGLE, Unit
 
 Columns = dict[str, tuple[float, ...]]
-"""The numbers of each parameter, by name."""
+"""Values of each parameter, by name."""
 
 Units = dict[str, str]
-"""The units that the table gives to columns, by name."""
+"""Units that the table gives for its columns, by name."""
 
 Place = Callable[[faults.Path, str], Fault]
-"""Makes a fault of its path in a table, such as the name of a column and the number of a row, and of its words."""
+"""Makes a fault from a path in a table (the name of a column, the number of a row) and a message."""
 
 
 def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
@@ -32,7 +32,7 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[C
 
     Returns
     -------
-    The columns in units of SI where the table gives units, and these units.
+    The columns, converted to SI where the table gives units, and these units.
 
     Raises
     ------
@@ -40,16 +40,16 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[C
         if the file cannot be read, or with a `Fault` for each cell that is wrong.
     """
     if name.endswith(".parquet"):
-        words = "Parquet files have ended; read it with pandas and pass the DataFrame, or save it as CSV"
-        raise ConfigError([source.fault(("cases",), f"{brief(name)}: {words}")])
+        message = "Parquet files are not supported; read it with pandas and pass the DataFrame, or save it as CSV"
+        raise ConfigError([source.fault(("cases",), f"{brief(name)}: {message}")])
     path, text = source.read_beside("cases", name)
     table = tables.read(str(path), text)
     first = {each: i for i, each in reversed([*enumerate(table.names)])}
     if again := [i for i, each in enumerate(table.names) if first[each] != i]:
-        raise ConfigError(table.fault("a second column of this name; remove one of the two", i) for i in again)
+        raise ConfigError(table.fault("duplicate column; remove one of the two", i) for i in again)
     if not 0 < len(table.rows) <= MAX_AXIS:
-        words = f"must have 1 to {MAX_AXIS} rows under its first line, not {len(table.rows)}"
-        raise fault_of(words, file=table.file)
+        message = f"must have 1 to {MAX_AXIS} rows under its first line, not {len(table.rows)}"
+        raise fault_of(message, file=table.file)
     cells: dict[str, list[Any]] = {each: list(table.numbers(i)) for i, each in enumerate(table.names)}
     units: Units = {}
     for i, each in enumerate(table.names):
@@ -58,23 +58,23 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[C
             units[each] = table.units[i] if isinstance(of, Unit) and of != ANGLE else ""
             cells[each] = [cell * scale if is_number(cell) else cell for cell in cells[each]]
 
-    def place(at: faults.Path, words: str) -> Fault:
+    def place(at: faults.Path, message: str) -> Fault:
         name, *row = at
-        return table.fault(words, table.names.index(str(name)), *map(int, row))
+        return table.fault(message, table.names.index(str(name)), *map(int, row))
 
     columns, more = _checked(cells, place, known)
     return columns, more | units
 
 
 def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
-    """Check a table that the configuration itself gives, by column; result and errors are as of `read`."""
-    return _checked(table, lambda path, words: source.fault(("cases", *path), words), known)
+    """Check a table given by column in the configuration itself; returns and raises as `read`."""
+    return _checked(table, lambda path, message: source.fault(("cases", *path), message), known)
 
 
 def _checked(table: Mapping[str, Any], place: Place, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
     read = {name: in_si(known[name].units if name in known else "", column) for name, column in table.items()}
     columns = {name: column for name, (column, _) in read.items()}
-    if found := [place(path, words) for path, words in _wrong(columns, known)]:
+    if found := [place(path, message) for path, message in _wrong(columns, known)]:
         raise ConfigError(found)
     return {name: tuple(map(float, column)) for name, column in columns.items()}, {
         n: unit for n, (_, unit) in read.items()

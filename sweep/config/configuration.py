@@ -1,4 +1,4 @@
-"""A checked configuration: everything below trusts it."""
+"""Defines a checked configuration, which all later code trusts."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from sweep.parameters import Parameter, sections
 from sweep.units import NUMBER, PAPER_UNITS, SI, TIME, named
 from sweep.variables import attributes
 
-# Maps are drawn with μ down, b across and one panel per n0.  Other axes follow in the order of the configuration.
+# Maps are drawn with μ down, b across and one panel per n0. Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
 
 
 def film_in(measure: Iterable[str]) -> str:
-    """The name of the film that is measured against, as the configuration has it; "" if there is none."""
+    """Return the name of the film to compare with, as given in the configuration; "" if there is none."""
     return next((spec.partition("=")[2] for spec in measure if spec.startswith(f"{Misfit.name}=")), "")
 
 
 def model_of(name: str, origin: Origin | None, physics: Physics) -> Tier:
-    """The model of this name, a variant of it for what the paper's does not know, or the one that a user brings."""
+    """Return the model of this name: built in, a variant with further physics, or user-defined."""
     if origin:
         return loading.find(origin, physics)
     return physics.variant(name) if physics.beyond and name in BASES else TIERS[name]
@@ -70,33 +70,33 @@ class Config:
     """Specs of measurements, as `sweep.kernels.measures.chosen` takes them."""
     max_failed_fraction: float
     picture: tuple[str, ...] = ()
-    """Variables to be drawn, as `sweep.plots.quantities.field` takes them; empty for what was measured first."""
+    """Variables to draw, as `sweep.plots.quantities.field` takes them; empty for the first measured variables."""
     repeats: bool = True
-    """Whether cells whose error is above the tolerance are run again, in shorter steps."""
+    """Whether cells whose error exceeds the tolerance are run again with shorter steps."""
     refine: int = 0
     cases: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    """Columns of the table of cases, if there is one, or of the samples."""
+    """Columns of the table of cases or of the samples, if there is one."""
     cases_file: str | None = None
     samples: int | None = None
-    """How many samples are drawn of the parameters that are distributions, if there are such."""
+    """Number of samples drawn from the distributions, if there are any."""
     seed: int = 0
     film: Film | None = None
-    """What the misfit is measured against."""
+    """The film with which the misfit is computed."""
     units: str = PAPER_UNITS
     law: str = PAPER_LAW
     """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
     surface: str = ELLIPSOID.name
     """Name of the surface, as in `sweep.models.general.surfaces.SURFACES`."""
     origin: Origin | None = None
-    """Where the model comes from, if a user brings it."""
+    """Origin of the model, if it is user-defined."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
-    """What it was made from, so that single values can be replaced; a copy with other values has none."""
+    """The document it was made from, so that single values can be replaced; None in a copy with other values."""
 
     def __repr__(self) -> str:
         return f"<Config {self.name}>\n{self.to_yaml()}"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the parameters, their values, meanings and units."""
+        """Return the table that a notebook shows: parameters, values, meanings and units."""
         rows = []
         for name, value in self.parameters.items():
             ends = " … ".join(f"{v:g}" for v in (value.numbers[0], value.numbers[-1])[: 1 + value.is_axis])
@@ -106,22 +106,22 @@ class Config:
         return f"<table><caption>{escape(self.name)}: {escape(self.model)}</caption>{''.join(rows)}</table>"
 
     def fault(self, path: Path, message: str) -> Fault:
-        """A fault at the key `path`, with the place where the user can correct it if that is known."""
+        """Return a fault at the key `path`, with its place in the file if that is known."""
         return (self.source or Document("")).fault(path, message, at_key=True)
 
     @property
     def row(self) -> str:
-        """What a row of `cases` is."""
+        """The meaning of a row of `cases`."""
         return SAMPLE if self.samples else CASE
 
     @property
     def distributions(self) -> dict[str, Distribution]:
-        """What is known of the parameters that are uncertain."""
+        """The distributions of the uncertain parameters."""
         return {name: value.distribution for name, value in self.parameters.items() if value.distribution}
 
     @property
     def at_medians(self) -> Config:
-        """The same with the median in place of each distribution."""
+        """Return a copy with the median in place of each distribution."""
         if not self.samples:
             return self
         medians = {name: Values.one(known.median) for name, known in self.distributions.items()}
@@ -133,14 +133,14 @@ class Config:
 
     @property
     def grid(self) -> Grid:
-        """All its cells."""
+        """The grid of all cells."""
         single = {name: v.numbers[0] for name, v in self.parameters.items() if not v.is_axis and name not in self.cases}
         axes, table = ({name: np.array(v) for name, v in each.items()} for each in (self.axes, self.cases))
         return Grid(axes, single, table, self.row)
 
     @property
     def tier(self) -> Tier:
-        """The model that runs it."""
+        """The model that is run."""
         names = frozenset((*present(self.parameters), *self.cases))
         law = self.own_law or laws.LAWS[self.law]
         return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
@@ -156,22 +156,22 @@ class Config:
 
     @property
     def own_law(self) -> laws.Law | None:
-        """The law of friction that a user brings for a rattleback."""
+        """The user-defined law of friction of a rattleback, if there is one."""
         return loading.law(self.origin) if self.origin else None
 
     @property
     def of_rattlebacks(self) -> bool:
-        """True if its bodies roll on a plane; a user's model may be of anything else."""
+        """True if the bodies roll on a plane; a user-defined model may describe anything."""
         return not self.origin or self.own_law is not None
 
     @property
     def table(self) -> Mapping[str, Parameter]:
-        """The parameters that it may name."""
+        """The parameters that the configuration may name."""
         return loading.table(self.origin)
 
     @property
     def equations(self) -> Model:
-        """The model of a configuration that is simulated."""
+        """Return the model of a configuration that is simulated."""
         assert isinstance(self.tier, Model)
         return self.tier
 
@@ -185,16 +185,16 @@ class Config:
         return {**attributes(parameter, self.units), **known}
 
     def unitless(self, name: str, written: str) -> str:
-        """Say why a parameter, or a time of the integrator, cannot have the unit that is `written`; "" if it can."""
+        """Say why a parameter, or a time of the integrator, cannot have the unit `written`; return "" if it can."""
         own = self.described(name).get("units", "") if name in self.table else named(TIME, self.units)
         if not own:
             return f"is a pure number here; leave out {written}"
         return "" if self.units == SI else f"is in {own} here; give the number without {written}, or set units: SI"
 
     def document(self) -> dict[str, Any]:
-        """The whole configuration, defaults included, as plain data."""
+        """Return the whole configuration, including defaults, as plain data."""
         table = self.table
-        # In the order of axes and samples, so that they keep it when the document is read again.
+        # Keep the order of axes and samples, so that reading the document again gives the same.
         varying = [name for name, value in self.parameters.items() if value.is_axis or value.distribution]
         kept = [name for name in varying if name not in FIRST_AXES or name in self.distributions]
         written = [table[name].place[0] for name in kept]
@@ -230,7 +230,7 @@ class Config:
         }
 
     def to_yaml(self) -> str:
-        """The whole configuration as the text of a file."""
+        """Return the whole configuration as the text of a YAML file."""
         stream = StringIO()
         yaml = YAML(typ="safe", pure=True)
         yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
@@ -238,9 +238,9 @@ class Config:
         return stream.getvalue()
 
     def fingerprint(self) -> str:
-        """Hash of everything that determines the numbers: not the name, the pictures, nor how many may fail."""
+        """Return a hash of everything that determines the numbers, unlike the name or the pictures."""
         decisive = self.document()
-        # What the file of a model says, which its SHA-256 tells, not where it lies.
+        # The content of a model file counts, through its SHA-256, and not its location.
         for key in ("name", "max_failed_fraction", "picture", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
         seen = [self.film.sha256] if self.film else []

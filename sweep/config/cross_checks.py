@@ -1,6 +1,6 @@
-"""Check that values which are valid by themselves fit together.
+"""Checks that individually valid values fit together.
 
-Each check yields the path of the key to be changed, and what is wrong with it and what to do.
+Each check yields the path of the key to change, and a message that says what is wrong and what to do.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ Misfit = tuple[Path, str]
 
 
 def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator[Misfit]:
-    """Check that parameters, law, units and surface belong together, and that the model knows them."""
-    if origin and not loading.law(origin):  # of any body
+    """Check that parameters, law, units and surface belong together, and that the model supports them."""
+    if origin and not loading.law(origin):  # any parameters
         if "units" in values.model_fields_set:
-            yield ("units",), "are said by the model's own file; leave them out"
+            yield ("units",), "the file of the model gives the units; leave them out"
         return
     if not origin and values.model_sha256 is not None:
-        yield ("model_sha256",), f"the {values.model} model comes from no file; leave it out"
+        yield ("model_sha256",), f"the {values.model} model does not come from a file; leave it out"
     if not origin and physics.beyond and values.model not in BASES:
         unknown = ", ".join(physics.beyond)
-        yield ("model",), f"the {values.model} model knows no {unknown}; choose {either(BASES)}"
+        yield ("model",), f"the {values.model} model does not support {unknown}; choose {either(BASES)}"
     else:
         yield from ((PARAMETERS[name].place, reason) for name, reason in physics.misfits().items())
 
 
 def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
-    """Check that values fit the model, the method and each other; `given` are those of all parameters."""
+    """Check that values fit the model, the method and each other; `given` holds the values of all parameters."""
     yield from _of_parameters(config, given)
     yield from _of_integrator(config)
     if config.refine:
@@ -62,14 +62,14 @@ def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
 
 
 def of_units(config: Config, written: Mapping[Path, str]) -> Iterator[Misfit]:
-    """Check that values with units, which are `written` by path, can have such in the units of the configuration."""
+    """Check that values with units (`written`, by path) may have them in the unit system of the configuration."""
     for path, unit in written.items():
         if reason := config.unitless(str(path[-1]), unit):
             yield path, reason
 
 
 def of_all_cells(config: Config) -> Iterator[Misfit]:
-    """Check all cells together; each check relies on those before it."""
+    """Check all cells; each check relies on the ones before it."""
     cells = config.grid.size
     if cells > MAX_CELLS:
         yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
@@ -89,17 +89,17 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
     model, columns = config.tier, config.cases
     for name, value in given.items():
         path = config.table[name].place
-        # A number that the model does not use may stay, so that one file serves every model.
+        # A parameter that the model does not use may stay, so that one file serves every model.
         if name not in model.parameters and value.is_axis:
             yield path, f"the {model.name} model has no {name}; its parameters are {', '.join(model.parameters)}"
         elif name in columns and not config.samples:
             yield path, f"is also a column of {config.cases_file}; remove one of the two"
         elif config.cases_file and (value.is_axis or value.distribution):
             kind = "a distribution" if value.distribution else "an axis"
-            yield path, f"cannot be {kind} beside cases; give a number, or a column of the table"
+            yield path, f"cannot be {kind} together with cases; give a number, or add a column to the table"
         elif config.samples and (beyond := [n for n in columns.get(name, ()) if not config.table[name].allows(n)]):
-            words = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
-            yield path, f"must be {config.table[name].allowed}, but {words}; choose another distribution"
+            message = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
+            yield path, f"must be {config.table[name].allowed}, but {message}; choose another distribution"
         if name in model.positive and 0.0 in value.numbers:
             yield path, f"must be > 0 for the {model.name} model, not 0"
     if config.samples and not config.distributions:
@@ -135,7 +135,7 @@ def _of_refinement(config: Config) -> Iterator[Misfit]:
 
 
 def _unmeasurable(name: str, config: Config) -> Iterator[str]:
-    """Say why the measurement `name` cannot be made."""
+    """Say why the measurement `name` is impossible."""
     model, kind, method = config.tier, measures.MEASURES[name], methods.METHODS.get(config.integrator.method)
     possible = measures.possible(model)
     if name not in possible:
@@ -147,7 +147,7 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
         yield f"{name} cannot be measured with method: {method.name}; choose {able}"
     elif kind is misfit.Misfit and config.film:
         if config.film.what != "spin":
-            yield f"the film {config.film_file} is of a {config.film.what}, and a misfit one of spins; use sweep fit"
+            yield f"the film {config.film_file} shows a {config.film.what}, but a misfit needs a spin; use sweep fit"
         if reason := unlike(config, config.film):
             yield f"the film {config.film_file} {reason}"
     elif TANGENT in kind.follows and isinstance(model, Model) and (reason := undifferentiable(model)):
@@ -155,9 +155,9 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
 
 
 def unlike(config: Config, film: Film) -> str:
-    """Say why a film cannot be one of trajectories of `config`; "" if it can.
+    """Say why a film cannot be compared with trajectories of `config`; return "" if it can.
 
-    A film in another unit than it seems is a million times too long, and takes as much longer to follow.
+    A film in the wrong unit can be a million times too long, and would take a million times longer to follow.
     """
     last, end = float(film.time[-1]), config.integrator.patient.t_end
     given = "name the unit in the header, such as 'time (ms)'"
@@ -165,8 +165,8 @@ def unlike(config: Config, film: Film) -> str:
         other = named(TIME, config.units) or "those of the model"
         return f"gives times in {film.clock}; set units: SI, or convert all to {other} and name no unit"
     if last > end:
-        words = f"lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
-        return f"{words}; if its times are in a unit such as ms, {given}" if film.clock == "" else words
+        message = f"lasts {last:g}, but trajectories {end:g}; raise t_end, or cut the film"
+        return f"{message}; if its times are in a unit such as ms, {given}" if film.clock == "" else message
     gap = float(np.median(np.diff(film.time)))
     if film.clock == "" and config.units == SI and gap >= _SLOW:
         return f"has rows {gap:g} s apart if its times are in s; {given}"
@@ -177,14 +177,14 @@ def unlike(config: Config, film: Film) -> str:
 
 
 _SLOW = 1.0
-"""Seconds between rows, beyond which the unit of time has to be named: a film shows no rattle then."""
+"""Seconds between rows above which the unit of time must be named: such a film would not resolve the rattle."""
 
 _FAST = 100.0
-"""Radians per second, 16 turns, beyond which no body stays on a table."""
+"""Radians per second, 16 turns, above which no body stays on a table."""
 
 
 def _unusable_step(config: Config) -> str:
-    """Say what is wrong with a step that the configuration fixes; "" if nothing is."""
+    """Say what is wrong with a step fixed in the configuration; return "" if nothing is."""
     step, model = config.integrator.step, config.tier
     if step == "auto" or not isinstance(model, Model):
         return ""
@@ -203,31 +203,31 @@ def _unusable_step(config: Config) -> str:
 _SHAPE = ("a", "b", "c", "offset", *INERTIA)
 
 Reason = tuple[str, int, dict[str, float]]
-"""Why some bodies cannot be or cannot stand, how many cells have one, and the parameters of the first."""
+"""Why some bodies are impossible or cannot stand, how many cells are affected, and the parameters of the first."""
 
 
 def impossible(config: Config) -> str:
-    """Say what is wrong with the first body if none can be or can stand; "" if any can."""
+    """Describe the first impossible body if all are impossible; return "" otherwise."""
     return unfit(config) if sum(cells for _, cells, _ in _reasons(config)) == config.grid.size else ""
 
 
 def unfit(config: Config) -> str:
-    """Say what is wrong with the first body that cannot be or cannot stand; "" if all can."""
-    return next((f"{words} (at {_at(first, _SHAPE)})" for words, _, first in _reasons(config)), "")
+    """Describe the first body that is impossible or cannot stand; return "" if there is none."""
+    return next((f"{message} (at {_at(first, _SHAPE)})" for message, _, first in _reasons(config)), "")
 
 
 def described_impossible(config: Config) -> dict[str, str]:
-    """Return the attribute of a dataset that says how many cells have the status `impossible`, and why."""
+    """Return the dataset attribute that says how many cells have the status `impossible`, and why."""
     varying = [name for name in _SHAPE if name in {*config.axes, *config.cases}]
     found = [
-        f"{cells} cells, {words.partition(';')[0]}, the first at {_at(first, varying)}"
-        for words, cells, first in _reasons(config)
+        f"{cells} cells, {message.partition(';')[0]}, the first at {_at(first, varying)}"
+        for message, cells, first in _reasons(config)
     ]
     return {"impossible": "; ".join(found)} if found else {}
 
 
 def misplaced(config: Config) -> str:
-    """Say what is wrong with the first cell whose start point lies off the body; "" if no cell's does."""
+    """Describe the first cell whose start point lies off the body; return "" if there is none."""
     surface = SURFACES[config.surface]
     if not config.of_rattlebacks or "x0" not in {*config.parameters, *config.cases}:
         return ""
@@ -249,7 +249,7 @@ def _at(values: Mapping[str, float], names: Iterable[str]) -> str:
 
 
 def _reasons(config: Config) -> list[Reason]:
-    """Collect the reasons why bodies cannot be or cannot stand; a cell counts for the first that is true of it."""
+    """Collect the reasons why bodies are impossible or cannot stand; only the first reason of a cell counts."""
     if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *config.cases}:
         return []
     grid, surface = config.grid, SURFACES[config.surface]
@@ -257,10 +257,10 @@ def _reasons(config: Config) -> list[Reason]:
     for columns in distinct(grid, BODY):
         left = np.ones(len(columns["a"]), bool)
         seen += len(left)
-        for bad, words in validity.wrongs(columns, surface):
+        for bad, message in validity.wrongs(columns, surface):
             cells = np.flatnonzero(bad & left)
             if len(cells):
-                first.setdefault(words, _cell(columns, cells[0]))
-                counts[words] += len(cells)
+                first.setdefault(message, _cell(columns, cells[0]))
+                counts[message] += len(cells)
                 left[cells] = False
-    return [(words, counts[words] * grid.size // seen, first[words]) for words in first]
+    return [(message, counts[message] * grid.size // seen, first[message]) for message in first]

@@ -1,4 +1,4 @@
-"""Parameters that are known as a distribution, and the samples that are drawn of them."""
+"""Defines the distributions of uncertain parameters, and draws samples from them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sweep.grid import Array
 
 
 def _normal(chance: Array, mean: float, deviation: float) -> Array:
-    from scipy.special import ndtri  # here, since few configurations need it
+    from scipy.special import ndtri  # imported here, since few configurations need it
 
     return np.asarray(mean + deviation * ndtri(chance))
 
@@ -31,14 +31,14 @@ def _uniform(chance: Array, low: float, high: float) -> Array:
 
 @dataclass(frozen=True)
 class Family:
-    """Distributions of one kind, which two numbers tell apart."""
+    """A family of distributions with two parameters."""
 
     quantile: Callable[[Array, float, float], Array]
-    """The value that a sample falls short of with a chance above 0 and below 1, from the chance and the two numbers."""
+    """The quantile function: the value for a probability between 0 and 1 (exclusive) and the two parameters."""
     words: tuple[str, str]
-    """What the two numbers are."""
+    """Names of the two parameters."""
     above: tuple[float, float | Literal["first"]]
-    """What each of the two has to exceed; the second perhaps the first."""
+    """Exclusive lower bound of each of the two parameters; that of the second may be the first parameter."""
 
 
 FAMILIES = {
@@ -51,7 +51,7 @@ FAMILIES = {
 
 @dataclass(frozen=True)
 class Distribution:
-    """What is known of a parameter."""
+    """The distribution of a parameter."""
 
     family: str
     first: float
@@ -59,9 +59,9 @@ class Distribution:
 
     @classmethod
     def parse(cls, raw: Mapping[str, Any]) -> Distribution:
-        """The distribution that a configuration names; `wrong` tells what is wrong with it."""
+        """Return the distribution given in a configuration; `wrong` makes the error."""
         if len(raw) > 1:
-            raise wrong(f"a distribution beside other keys; keep one of {', '.join(raw)}")
+            raise wrong(f"a distribution together with other keys; keep one of {', '.join(raw)}")
         ((name, numbers),) = raw.items()
         family = FAMILIES[name]
         if not isinstance(numbers, list) or len(numbers) != 2:
@@ -75,17 +75,17 @@ class Distribution:
 
     @property
     def spec(self) -> dict[str, list[float]]:
-        """As it stands in a configuration."""
+        """Return the distribution as it is written in a configuration."""
         return {self.family: [self.first, self.second]}
 
     @property
     def words(self) -> str:
-        """Such as "normal, mean 0.05, standard deviation 0.002"."""
+        """Describe the distribution, such as "normal, mean 0.05, standard deviation 0.002"."""
         first, second = FAMILIES[self.family].words
         return f"{self.family}, {first} {self.first:g}, {second} {self.second:g}"
 
     def at(self, chance: Array) -> Array:
-        """The values that samples fall short of with these chances, each above 0 and below 1, of the same shape."""
+        """Return the quantiles for probabilities between 0 and 1 (exclusive), in an array of the same shape."""
         return FAMILIES[self.family].quantile(chance, self.first, self.second)
 
     @property
@@ -94,26 +94,27 @@ class Distribution:
 
 
 def drawn(known: Mapping[str, Distribution], number: int, seed: int) -> dict[str, tuple[float, ...]]:
-    """Draw so many samples of all parameters, each of its distribution and independent of the others.
+    """Draw samples of all parameters, each from its own distribution and independently.
 
     Returns
     -------
-    The numbers of each parameter, shape (number,).
+    The values of each parameter, shape (number,).
     """
     chance = chances(len(known), number, seed)
     return {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
 
 
 def chances(parameters: int, number: int, seed: int) -> Array:
-    """Scrambled Sobol points, which fill the unit cube more evenly than chance does; shape (number, parameters).
+    """Return scrambled Sobol points, more even than random points, of shape (number, parameters).
 
-    None is on its sides.  More points of one seed begin with the fewer (Owen 1998, doi 10.1006/jcom.1998.0487).
+    No point lies on a face of the cube. With the same seed, a longer sequence begins with the shorter one (Owen 1998,
+    doi 10.1006/jcom.1998.0487).
     """
-    from scipy.stats import qmc  # takes half a second
+    from scipy.stats import qmc  # importing takes half a second
 
     points = qmc.Sobol(parameters, rng=seed, bits=_BITS).random_base2((number - 1).bit_length())[:number]
-    return np.asarray(points + 2.0 ** -(_BITS + 1))  # the middles of their cells: none is 0
+    return np.asarray(points + 2.0 ** -(_BITS + 1))  # the middle of each cell, which is never 0
 
 
 _BITS = 52
-"""Binary digits of a Sobol point."""
+"""Number of binary digits of a Sobol point."""

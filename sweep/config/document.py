@@ -1,8 +1,7 @@
-"""YAML documents as plain values, with the line and column of every part.
+"""Reads YAML documents as plain values, with the line and column of every part.
 
-Documents are YAML 1.2, in which 1e-3 is a number and `no` a word.  Only plain data is accepted: tags,
-anchors and duplicate keys are refused, so that nothing in a file can run code, repeat itself without
-end, or override an earlier line unseen.
+Documents are YAML 1.2, in which 1e-3 is a number and `no` a word. Only plain data is accepted: tags, anchors and
+duplicate keys are refused, so that a file cannot run code, expand without end, or silently override an earlier line.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ _RANGE = re.compile(rf"({NUMERAL}[^.:]*)\.\.({NUMERAL}[^.:]*):({NUMERAL})")
 _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None, ".inf": inf, "-.inf": -inf, ".nan": nan}
 
 _DEEPEST = 100
-"""Brackets within one another; more are refused."""
+"""Deepest nesting of brackets that is accepted."""
 
 Place = tuple[int, int]
-"""Line and column, which count from one."""
+"""Line and column, counted from one."""
 
 
 @dataclass
@@ -40,23 +39,23 @@ class Document:
     """The values of a configuration, and where each comes from: a line and column of a file, or an argument."""
 
     file: str
-    """"" for a mapping, which is no file."""
+    """Name of the file; "" for a mapping."""
     values: Any = None
     places: dict[Path, tuple[Place, Place]] = field(default_factory=dict)
-    """Where the key of each value stands, and where the value; an item of a list has no key but itself."""
+    """Where the key of each value stands, and where the value stands; an item of a list is its own key."""
     arguments: dict[Path, tuple[str, Path]] = field(default_factory=dict)
-    """For each value that an argument gave, and each section that it added: the argument, and the path that it set."""
+    """For each value or section set by an argument: the argument, and the path that it set."""
     known: dict[tuple[str, str], Any] = field(default_factory=dict)
-    """What is in the files that it names, by key and name, once they are read: a table of cases, a film, a model."""
+    """Contents of the files named in the document (a table of cases, a film, a model), by key and name, once read."""
 
     def once(self, key: str, name: str, read: Callable[[], Any]) -> Any:
-        """What is in the file `name`, read once for all that is made from this document."""
+        """Return the contents of the file `name`, read once for everything made from this document."""
         if (key, name) not in self.known:
             self.known[key, name] = read()
         return self.known[key, name]
 
     def read_beside(self, key: str, name: str) -> tuple[FilePath, str]:
-        """Path and text of the file `name`, relative to this document's folder, that it names by `key`.
+        """Return path and text of the file `name`, relative to this document's folder, named under `key`.
 
         Raises
         ------
@@ -67,7 +66,7 @@ class Document:
         return path, text_of(path, lambda reason: ConfigError([self.fault((key,), f"{brief(str(path))}: {reason}")]))
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
-        """A fault at `path`; it is placed at the nearest section above if the document lacks that path."""
+        """Return a fault at `path`, placed at the nearest enclosing section if the document lacks that path."""
         known = path
         while known and known not in self.places and known not in self.arguments:
             known = known[:-1]
@@ -80,7 +79,7 @@ class Document:
         return Fault(argument, None, None, path, message)
 
     def set(self, path: Path, value: Any, argument: str) -> None:
-        """Put `value` at `path`, and add the sections above it; faults in it name `argument`."""
+        """Put `value` at `path`, and add the sections above it; errors in it name `argument`."""
         section = self.values
         for depth, part in enumerate(path[:-1], start=1):
             if part not in section:
@@ -96,17 +95,17 @@ class Document:
 
 
 def plain_data(value: Any) -> Any:
-    """Python's `value` as a YAML file could hold it: mappings, lists, words and numbers.
+    """Return a Python value as a YAML file could hold it: mappings, lists, text and numbers.
 
     Tuples, ranges and arrays become lists; an array is whatever NumPy can read as one, such as an `xarray.DataArray` or
-    a `pandas.Series`.  A `pandas.DataFrame` becomes a mapping of its columns.  Values of any other type are returned as
-    they are, and refused by the schema.
+    a `pandas.Series`.  A `pandas.DataFrame` becomes a mapping of its columns.  Values of any other type are returned
+    unchanged; the schema refuses them.
     """
     if isinstance(value, Mapping):
         return {str(key): plain_data(item) for key, item in value.items()}
     if isinstance(value, list | tuple | range):
         return [plain_data(item) for item in value]
-    if hasattr(value, "columns") and hasattr(value, "to_dict"):  # a table of pandas
+    if hasattr(value, "columns") and hasattr(value, "to_dict"):  # a pandas DataFrame
         return plain_data(value.to_dict("list"))
     if hasattr(value, "__array__"):
         return np.asarray(value).tolist()
@@ -114,7 +113,7 @@ def plain_data(value: Any) -> Any:
 
 
 def read(path: FilePath) -> Document:
-    """Read a YAML file; a `ConfigError` says what is wrong with it and where."""
+    """Read a YAML file; raise a `ConfigError` that says what is wrong with it and where."""
     text = text_of(path)
     node = _compose(text, str(path))
     if not isinstance(node, MappingNode):
@@ -125,7 +124,7 @@ def read(path: FilePath) -> Document:
 
 
 def parse_value(text: str, source: str) -> Any:
-    """The value of a command line's text: START..STOP:NUM as a range, else YAML; a `ConfigError` names `source`."""
+    """Return the value of a command-line text: START..STOP:NUM as a range, otherwise YAML; errors name `source`."""
     if span := _RANGE.fullmatch(text):
         start, stop, num = (text.strip() if (value := number(text)) is None else value for text in span.groups())
         return {"start": start, "stop": stop, "num": num}
@@ -134,7 +133,7 @@ def parse_value(text: str, source: str) -> Any:
 
 
 def is_number(value: Any) -> TypeGuard[float]:
-    """Tell a number, which a truth value is not."""
+    """Return whether a value is a number; booleans are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -143,16 +142,16 @@ _OTHER_FILES = {
     b"CDF": "a dataset, not text; its attribute `config` holds the configuration, and `sweep info` describes it",
     b"PK": "a spreadsheet or another archive, not text; save it as CSV (UTF-8)",
 }
-"""What files are that begin with these bytes, and what to do."""
+"""What a file is whose first bytes are these, and what to do about it."""
 
 
 def text_of(path: FilePath, error_of: Callable[[str], ConfigError] | None = None) -> str:
-    """The text of a file, in UTF-8, or in UTF-16 if it begins with a mark of that.
+    """Return the text of a file in UTF-8, or in UTF-16 if it has that byte order mark.
 
     Raises
     ------
     ConfigError
-        if the file cannot be read: what `error_of` makes of the reason, by default a fault of the file.
+        if the file cannot be read; made by `error_of` from the reason, by default a fault of the file.
     """
     try:
         data = path.read_bytes()
@@ -164,19 +163,19 @@ def text_of(path: FilePath, error_of: Callable[[str], ConfigError] | None = None
         reason = "no such file"
     except UnicodeDecodeError as error:
         reason = f"not UTF-8 text: byte {error.start}; save it as UTF-8"
-    except (OSError, ValueError) as error:  # the name of a file may contain a NUL
+    except (OSError, ValueError) as error:  # a file name may contain a NUL
         reason = f"cannot be read: {getattr(error, 'strerror', None) or error}"
     raise error_of(reason) if error_of else fault_of(reason, file=str(path))
 
 
 def _compose(text: str, file: str) -> Node | None:
-    # ruamel takes a time that grows with the square of the depth: a minute for some thousand brackets.
+    # The time ruamel takes grows with the square of the depth: a minute for a few thousand brackets.
     depths = accumulate((character in "[{") - (character in "]}") for character in text)
     if max(depths, default=0) > _DEEPEST:
         raise ConfigError([Fault(file, None, None, (), "not YAML: nested too deeply")])
     try:
         return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
-    except Exception as error:  # ruamel lets errors of chr(), of its own recursion and others escape
+    except Exception as error:  # ruamel lets errors of chr(), its own recursion errors and others escape
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         words = getattr(error, "problem", None) or getattr(error, "context", None) or str(error)
         problem = "nested too deeply" if isinstance(error, RecursionError) else words.split("\n")[0]
@@ -185,14 +184,14 @@ def _compose(text: str, file: str) -> Node | None:
 
 
 def _values(root: Node, document: Document) -> Any:
-    """The values of a tree of nodes, whose places are noted in `document`."""
+    """Return the values of a tree of nodes, and note their places in `document`."""
     faults: list[Fault] = []
 
     def convert(node: Node, path: Path, key: Place | None = None) -> Any:
         document.places[path] = key or _place(node), _place(node)
-        # An alias leads back to a node with an anchor; as anchors are refused, no alias is ever followed.
-        # A tag stands at the start of its node.  Types that ruamel infers without one, such as timestamps,
-        # do not matter: `_scalar` reads the text itself.
+        # An alias refers to a node with an anchor; as anchors are refused, no alias is ever followed. A tag stands at
+        # the start of its node. Types that ruamel infers without a tag, such as timestamps, do not matter: `_scalar`
+        # reads the text itself.
         if node.anchor or node.start_mark.buffer[node.start_mark.pointer] == "!":
             faults.append(document.fault(path, "a YAML tag or anchor; write the plain value"))
             return None
@@ -228,7 +227,7 @@ def _values(root: Node, document: Document) -> Any:
 
 
 def _cut(before: Node, after: Node) -> str:
-    """The number, perhaps with a unit, that a decimal comma between two nodes has cut into these; "" if none has."""
+    """Return the number, possibly with a unit, that a decimal comma has split into two nodes; "" otherwise."""
     texts = [node.value if isinstance(node, ScalarNode) and node.style is None else "" for node in (before, after)]
     close = after.start_mark.index == before.end_mark.index + 1
     return ".".join(texts) if close and re.fullmatch(r"[-+−]?[0-9]+,[0-9]+[^0-9]*", ",".join(texts)) else ""
@@ -240,7 +239,7 @@ def _place(node: Node) -> Place:
 
 def _scalar(node: ScalarNode) -> str | float | bool | None:
     text: str = node.value
-    if node.style is not None:  # quoted
+    if node.style is not None:  # the value was quoted
         return text
     value = number(text)
     return value if value is not None else _WORDS.get(text.lower(), text)

@@ -1,4 +1,4 @@
-"""A film of a body that spins, from a table of numbers: its spin, its heading, or what a gyroscope on it tells."""
+"""Reads a film of a spinning body from a table: its spin, its heading, or the reading of a gyroscope on it."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from sweep.kernels.samples import Seen
 from sweep.units import ANGLE, SPIN, TIME, Unit, factor
 
 MOST_ROWS = 20_000
-"""Rows of a longer film are left out evenly: they would add time and hardly any knowledge."""
+"""Most rows of a film; a longer film is thinned evenly, since more rows add time and hardly any information."""
 
-# What trackers and phones call their columns, without the unit in parentheses: Sensor Logger `seconds_elapsed` and `z`
-# (its `time` counts nanoseconds since 1970), Physics Toolbox `wz`, Tracker `ω` and `θ`.  The first one counts.
+# Column names of trackers and phones, without the unit in parentheses: Sensor Logger `seconds_elapsed` and `z` (its
+# `time` counts nanoseconds since 1970), Physics Toolbox `wz`, Tracker `ω` and `θ`. The first match counts.
 _NAMES: dict[str, tuple[str, ...]] = {
     "time": ("seconds elapsed", "time", "t"),
     "spin": ("spin", "n", "angular velocity", "omega", "ω"),
@@ -33,43 +33,43 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "error": ("error", "sigma", "uncertainty"),
 }
 
-# phyphox translates its columns, such as "Gyroskop Z" and "Żyroskop - składowa z"; units and the letter stay.
+# phyphox translates its column names, such as "Gyroskop Z" and "Żyroskop - składowa z"; units and the letter stay.
 _UPRIGHT = re.compile(r"(.*\W)?z")
 
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """What was seen, from its first instant on; arrays of shape (instants,)."""
+    """The observed values, from the first instant on; arrays of shape (instants,)."""
 
     time: Array
-    """Since the first instant, in the unit of time of the configuration: s in SI."""
+    """Time since the first instant, in the time unit of the configuration: s in SI."""
     value: Array
     error: Array | None = None
-    """Standard error of each value, if the film gives it."""
+    """Standard error of each value, if the film gives one."""
     what: Seen = "spin"
-    """What the values are: the spin; the angular velocity about the axis of the body that points upwards at rest; or
-    the angle in radian, without wraps, by which the body's x axis has turned, seen from above."""
+    """What the values are: the spin; the angular velocity about the body axis that points upwards at rest; or the angle
+    in radian, unwrapped, by which the body's x axis has turned, seen from above."""
     left_out: int = 0
-    """Rows that hold no number, or that are too many."""
+    """Number of rows left out, because they hold no number or because there are too many."""
     why: str = ""
-    """Which these are, in words."""
+    """A description of these rows."""
     clock: str | None = None
-    """The unit of time that the table gives, or "" if it gives none; None for a film that is no table."""
+    """The unit of time that the table gives, or "" if it gives none; None for a film that is not from a table."""
 
     @property
     def omitted(self) -> str:
-        """Which rows are left out, in words; "" if none."""
+        """Describe the rows that are left out; return "" if there are none."""
         verb = "is" if self.left_out == 1 else "are"
         return f"{counted(self.left_out, 'row')} of the film {verb} left out: {self.why}" if self.left_out else ""
 
     @property
     def errors(self) -> Array:
-        """The standard errors, which are one if the film does not give them."""
+        """Return the standard errors, or ones if the film does not give them."""
         return np.ones_like(self.time) if self.error is None else self.error
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of everything that determines a misfit."""
+        """Return a hash of everything that determines a misfit."""
         rows = np.stack([self.time, self.value, self.errors])
         return hashlib.sha256(rows.tobytes() + self.what.encode()).hexdigest()
 
@@ -78,18 +78,18 @@ class Film:
 
 
 def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film:
-    """Read a film from a table with a header, columns apart by commas, semicolons or tabs.
+    """Read a film from a table with a header and columns separated by commas, semicolons or tabs.
 
     Parameters
     ----------
-    time_column, spin_column : the names of the columns of the time and of what is seen, with the unit in parentheses
-        if the table does not give it, or a wrong one, such as "omega (deg/s)"; by default those of known names
+    time_column, spin_column : names of the time and data columns, with the unit in parentheses if the table gives none
+        or a wrong one, such as "omega (deg/s)"; by default columns with known names are used
 
     Raises
     ------
     ConfigError
-        if there is no such file, or it has no time, nothing that is seen, an unknown unit, a time that goes back, too
-        few rows, or text instead of numbers.
+        if the file does not exist, or has no time or data column, an unknown unit, decreasing times, too few rows, or
+        text instead of numbers.
     """
     table = tables.read(str(path), text_of(Path(path)))
     found, asked = _columns(table), _asked(table, time_column, spin_column)
@@ -114,7 +114,7 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
     assert value is not None
     whole = np.flatnonzero(np.isfinite(time) & np.isfinite(value))
     if len(back := np.flatnonzero(np.diff(time[whole]) < 0)):
-        words = "the time goes back; sort the rows by time"
+        words = "the time decreases; sort the rows by time"
         raise ConfigError([table.fault(words, found["time"], int(whole[back[0] + 1]))])
     if error is not None and len(wrong := whole[~(error[whole] > 0)]):
         raise ConfigError([table.fault("the error must be a number > 0", found["error"], int(wrong[0]))])
@@ -123,7 +123,7 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
     every = -(-len(whole) // MOST_ROWS) or 1
     kept = whole[::every]
     if len(kept) < 8 or time[kept[-1]] == time[kept[0]]:
-        need = "a fit needs at least 8, not all at one time"
+        need = "a fit needs at least 8 rows, at different times"
         raise fault_of(f"has {len(kept)} rows with a time and a {what}; {need}", file=str(path))
     return Film(
         time[kept] - time[kept[0]], value[kept], None if error is None else error[kept], what,
@@ -133,7 +133,7 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
 
 
 def _columns(table: Table) -> dict[str, int]:
-    """The place of each known column: by its name, or else by its unit."""
+    """Return the index of each known column, found by its name or else by its unit."""
     plain = [_plain(name) for name in table.names]
     found = {
         what: min((plain.index(name) for name in known if name in plain), key=lambda place: known.index(plain[place]))
@@ -149,13 +149,14 @@ def _columns(table: Table) -> dict[str, int]:
 
 
 def _turns(table: Table, place: int) -> bool:
-    """Whether a column is of angular velocities: by its unit, or in Sensor Logger's table of the gyroscope."""
+    """Return whether a column holds angular velocities: by its unit, or because it is Sensor Logger's table of the
+    gyroscope."""
     of_logger = "gyro" in Path(table.file).name.lower() and "seconds_elapsed" in table.names
     return bool(factor(table.units[place], SPIN)) or (of_logger and not table.units[place])
 
 
 def _asked(table: Table, time_column: str, spin_column: str) -> dict[str, int]:
-    """The places of the columns that are asked for by name; their units are set where the names say them."""
+    """Return the indices of the columns asked for by name; units in the names are applied to the columns."""
     found = {}
     for option, text in (("--time-column", time_column), ("--spin-column", spin_column)):
         if not text:
@@ -172,7 +173,7 @@ def _asked(table: Table, time_column: str, spin_column: str) -> dict[str, int]:
 
 
 def _kind(name: str, unit: str) -> str:
-    """What a column shows, by its name, or else by its unit."""
+    """Return what a column shows, by its name, or else by its unit."""
     usual = "heading" if factor(unit, ANGLE) else "gyroscope" if _UPRIGHT.fullmatch(name) else "spin"
     return next((what for what in get_args(Seen) if name in _NAMES[what]), usual)
 
@@ -182,28 +183,28 @@ def _plain(name: str) -> str:
 
 
 def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array:
-    """A column in SI, with NaN for cells without a number, which are noted in `gaps` by row; shape (rows,).
+    """Return a column in SI, with NaN for cells without a number, which are noted in `gaps` by row; shape (rows,).
 
-    A spelling of numbers that is not understood would leave out one half of a motion, such as all that is negative.
+    If a spelling of numbers is not understood, half of the motion could be lost, such as all negative values.
     """
     scale, cells = table.scale(place, unit), table.numbers(place)
     texts = {row: cell for row, cell in enumerate(cells) if isinstance(cell, str)}
     gaps |= texts
     odd = [row for row, cell in texts.items() if cell.lower() not in GAPS]
     if strange := [row for row in odd if not re.search("[^\\W\\d_]", texts[row])] or odd[: len(odd) * 10 // len(cells)]:
-        words = f"'{brief(texts[strange[0]], 40)}' is no number, as are {len(odd)} of {len(cells)} cells"
-        words += "; write numbers alone, with the unit in the header, and leave cells without one empty"
+        words = f"'{brief(texts[strange[0]], 40)}' is not a number ({len(odd)} of {len(cells)} cells)"
+        words += "; write numbers only, put the unit in the header, and leave missing cells empty"
         raise ConfigError([table.fault(words, place, strange[0])])
     return np.array([np.nan if isinstance(cell, str) else cell * scale for cell in cells])
 
 
 def _why(missing: int, gaps: Mapping[int, str], whole: int, every: int) -> str:
-    """Say which rows of a film are left out: those of `gaps`, and all but `every` so-manieth of the `whole` ones."""
+    """Describe the rows of a film left out: those in `gaps`, and all but every `every`-th of the `whole` ones."""
     example = next((text for text in gaps.values() if text.lower() not in GAPS), "")
     words = (
         [f"{counted(missing, 'row')} without a number" + (f" (one has '{brief(example, 40)}')" if example else "")]
         if missing
         else []
     )
-    words += [f"all but each {every}th of {whole} rows, as more would hardly add knowledge"] if every > 1 else []
+    words += [f"all but one in {every} of {whole} rows, as more would hardly add information"] if every > 1 else []
     return " and ".join(words)

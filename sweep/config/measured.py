@@ -1,4 +1,4 @@
-"""From what a ruler and a balance say of a rattleback to its configuration."""
+"""Computes a configuration from the measured dimensions of a rattleback."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from sweep.units import SI, WRITTEN, Unit, named, quantity, unit_in
 
 _MILLIMETRE = 1e-3
 _LEAST = 1.0
-"""Longest size in millimetres below which a shape must be in another unit."""
+"""Longest size in millimetres below which a shape must be in some other unit."""
 _MASS = ("mass", "density")
 _AXES = [[size, *filter(None, [solids.RADII.get(axis)]), axis] for axis, size in solids.SIZES.items()]
-"""For each semi-axis, the names of the measurements that tell it."""
+"""For each semi-axis, the names of the measurements that determine it."""
 
 _SOLID = """\
 # A homogeneous solid {solid}, by `python -m sweep body` from
 #   {said}.
 # With semi-axes A, B, C of the solid, inertia about the centre of the ellipsoid is m diag(B² + C², A² + C², A² + B²)/5,
 # and the centre of mass lies {below} (E. W. Weisstein, mathworld.wolfram.com, "Ellipsoid" and "Hemisphere").
-# The axes of inertia are then turned by the angle; without one, nothing tells one sense of spin from the other.
+# The axes of inertia are then turned by the angle; without an angle both senses of spin behave alike.
 """
 _SHAPE = """\
 # A homogeneous solid of the shape {file}, in millimetres ({sizes}) and z up, by `python -m sweep body` from
@@ -35,8 +35,8 @@ _SHAPE = """\
 # of a, b and c is fitted to the lowest tenth of its height, within {misfit:.2g} m.
 """
 _BODY = """\
-# Behind ± are errors, to first order, if those of the measurements are independent; a normal distribution has its mean
-# and error in brackets.
+# The errors behind ± are to first order, for independent measurements; brackets hold mean and error of a normal
+# distribution.
 units: {units}
 body:
 {entries}
@@ -47,7 +47,7 @@ start: {{n0: {n0:g}, x0: {x0:.2g}, y0: {y0:.2g}}}
 """
 
 _SPIN, _LASTS = 5.0, 20.0
-"""The start spin, and the time in which drag alone takes two thirds of it, in seconds."""
+"""The start spin, and the time in seconds in which drag alone reduces it by two thirds."""
 
 
 @dataclass(frozen=True)
@@ -60,27 +60,27 @@ class Measured:
 
 
 Given = Mapping[str, Measured]
-"""What was measured, by the names of the parameters of `sweep.models.general.solids.body`."""
+"""Measured values, by the parameter names of `sweep.models.general.solids.body`."""
 
 
 def measured(name: str, text: str, parameter: Parameter) -> Measured:
-    """Read a number with its unit and perhaps its error, such as "12.0+-0.1 cm".
+    """Read a number with a unit and optionally an error, such as "12.0+-0.1 cm".
 
     Parameters
     ----------
-    name : of the measurement, whose option is named in faults
-    parameter : whose unit and bounds it has
+    name : of the measurement; error messages name its option
+    parameter : defines unit and bounds
 
     Raises
     ------
     ConfigError
-        if `text` is something else.
+        if `text` is not of this form.
     """
     option, unit = _option(name), parameter.units
     assert isinstance(unit, Unit)
     if not (found := quantity(text, unit)):
-        words = refusal(text, f"a number with its unit ({either(WRITTEN[unit])})")
-        raise fault_of(words + ("" if unit_in(text) else instead(text, parameter)), file=option)
+        message = refusal(text, f"a number with its unit ({either(WRITTEN[unit])})")
+        raise fault_of(message + ("" if unit_in(text) else instead(text, parameter)), file=option)
     value, error = found
     if not (parameter.allows(value) and 0 <= error < float("inf")):
         raise fault_of(refusal(text, f"{parameter.allowed}, in {unit.si}, with an error >= 0"), file=option)
@@ -88,7 +88,7 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
 
 
 def of_solid(given: Given, *, whole: bool) -> str:
-    """Return the text of a configuration, in SI units, of the body that `sweep.models.general.solids.body` makes.
+    """Return the text of a configuration in SI units for the body made by `sweep.models.general.solids.body`.
 
     Raises
     ------
@@ -105,14 +105,14 @@ def of_solid(given: Given, *, whole: bool) -> str:
 
 
 def of_shape(given: Given, file: Path) -> str:
-    """Return the text of a configuration, in SI units, of the body whose shape is in an STL file, in millimetres.
+    """Return the text of a configuration in SI units for the shape in an STL file, in millimetres.
 
     Raises
     ------
     OSError
         if the file cannot be read.
     ConfigError
-        if more is given than a mass or a density, or if the shape is none or does not stand.
+        if more is given than a mass or a density, or if the shape is not closed or does not stand.
     """
     _check_names(given, [_MASS])
     for name in [each for each in given if each not in _MASS]:
@@ -130,11 +130,11 @@ def of_shape(given: Given, file: Path) -> str:
 
 
 def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> str:
-    """Return the lines of a configuration whose body `formula` makes of what was measured."""
+    """Return the lines of a configuration for the body that `formula` computes from the measurements."""
     values, errors = ({name: getattr(each, part) for name, each in given.items()} for part in ("value", "error"))
     found, spread = formula(values), solids.propagated(formula, values, errors)
     units = {name: named(PARAMETERS[name].units, SI) for name in found}
-    # It is the angle that makes it uncertain, which is hard to measure.
+    # The angle, which is hard to measure, causes the uncertainty.
     unsure = "Ixy" if errors.get("angle") else ""
     entries = (_entry(name, value, spread[name], units[name], name == unsure) for name, value in found.items())
     guesses = {"sigma": found["Izz"] / _LASTS, "n0": -_SPIN if found.get("Ixy", 0) > 0 else _SPIN}
@@ -144,9 +144,9 @@ def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> 
 
 
 def _entry(name: str, value: float, error: float, unit: str, unsure: bool) -> str:
-    """A line of the body: a distribution if it is `unsure`, else a number.
+    """Return a line of the body: a distribution if it is `unsure`, otherwise a number.
 
-    The errors of all but one are tied to each other, and stay comments.
+    The errors of all parameters but one are correlated, and stay comments.
     """
     if unsure:
         return f"  {name}: {{normal: [{value + 0.0:.6g}, {error:.2g}]}}  # {unit}"
@@ -162,7 +162,7 @@ def _option(name: str) -> str:
 
 
 def _check_names(given: Given, needed: Sequence[Sequence[str]]) -> None:
-    """Refuse that all names of a group are missing, and two that tell the same."""
+    """Refuse missing measurements, and two that determine the same parameter."""
     for names in needed:
         if not given.keys() & {*names}:
             raise fault_of(f"a measurement is missing; add {either(map(_option, names))}", file="body")

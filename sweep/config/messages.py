@@ -1,6 +1,6 @@
-"""Say why the schema refuses a value, in our words, made from the schema itself.
+"""Explains why the schema refuses a value, in words derived from the schema itself.
 
-Of pydantic's errors only the type and the place are used, never the text.
+Only the type and location of pydantic's errors are used, never their text.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ _KINDS = {bool: "true or false", int: "a whole number", float: "a finite number"
 
 
 class Allowed(str):
-    """What a field allows, in words; in the `Annotated` type of a field whose type and bounds do not say it."""
+    """A description of permitted values, in the `Annotated` type of a field whose type and bounds do not say it."""
 
     __slots__ = ()
 
 
 def wrong(reason: str, *at: str | int) -> PydanticCustomError:
-    """A fault in the value that is being checked; `at` is the path inside that value."""
+    """An error in the value being checked; `at` is the path inside that value."""
     return PydanticCustomError("value", "{reason}", {"reason": reason, "at": at})
 
 
-def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[str, bool]]:
-    """Map the path of each of pydantic's errors to the message, and to whether the key itself is at fault."""
+def explain(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[str, bool]]:
+    """Map the path of each of pydantic's errors to a message, and to whether the key itself is wrong."""
     found, sections = {}, _sections(schema)
     for error in errors:
         place, kind = error["loc"], error["type"]
         section = sections.get(place[0], schema) if len(place) > 1 else schema
-        path = place[:1] if section is schema else place[:2]  # beyond, places name members of unions
+        path = place[:1] if section is schema else place[:2]  # what follows names members of unions
         if not path:
-            found[path] = "a key that is no text; correct its spelling", False
+            found[path] = "a key that is not text; correct its spelling", False
         elif kind == "extra_forbidden":
             key = str(path[-1])
             more = _OFF_AXIS if _SIDEWAYS.fullmatch(key) else _other_key(key, section, sections)
@@ -63,7 +63,7 @@ def describe(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple
 
 
 def allowed(field: FieldInfo) -> str:
-    """Say in words what a field of the schema allows."""
+    """Describe the values that a field of the schema permits."""
     if words := [mark for mark in field.metadata if isinstance(mark, Allowed)]:
         return words[0]
     kind = next(kind for kind in (*get_args(field.annotation), field.annotation) if kind is not NoneType)
@@ -77,7 +77,7 @@ def allowed(field: FieldInfo) -> str:
 
 
 def _choices(field: FieldInfo) -> list[str]:
-    """The words among which a field lets choose."""
+    """Return the words that a field permits."""
     kinds = (field.annotation, *get_args(field.annotation))
     return [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
 
@@ -88,7 +88,7 @@ def _sections(schema: type[BaseModel]) -> dict[str, type[BaseModel]]:
 
 
 def _other_key(key: str, section: type[BaseModel], sections: dict[str, type[BaseModel]]) -> str:
-    """The key that may be meant by an unknown one: of the same section, or the path of one in another."""
+    """Return the key that was probably meant: one of the same section, or the path of one in another section."""
     elsewhere = {inner: f"{name}.{inner}" for name, kind in sections.items() for inner in kind.model_fields}
     if key in elsewhere:
         return suggestion(key, [key], elsewhere)

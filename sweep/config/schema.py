@@ -1,4 +1,4 @@
-"""The schema of a configuration.  Input is checked and normalised here, and trusted from then on."""
+"""Defines the schema of a configuration. Input is checked and normalised here, and trusted from then on."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from sweep.units import PAPER_UNITS, SI, TIME
 
 
 def _measures(raw: Any) -> Any:
-    """Specs of the measurements: "reversals" for `reversals`, "reversal_times=12" for `{reversal_times: 12}`."""
+    """Return the specs of the measurements: "reversal_times=12" for `{reversal_times: 12}`."""
     if not isinstance(raw, list):
         return raw
     specs = [_measure(item, i) for i, item in enumerate(raw)]
     if len({spec.partition("=")[0] for spec in specs}) < len(specs):
-        raise wrong("a measurement twice; name each once")
+        raise wrong("duplicate measurement; name each once")
     return specs
 
 
@@ -52,7 +52,7 @@ def _measure(raw: Any, i: int) -> str:
     if not isinstance(raw, dict):
         return kind().spec
     if kind.bounds is None:
-        raise wrong(f"{name} takes no setting; write the name alone", i)
+        raise wrong(f"{name} has no settings; write only the name", i)
     low, high = kind.bounds
     setting = whole(setting)
     if type(setting) is not int or not low <= setting <= high:
@@ -63,7 +63,7 @@ def _measure(raw: Any, i: int) -> str:
 def _each_once(raw: Any) -> Any:
     for i, name in enumerate(raw if isinstance(raw, list) else []):
         if name in raw[:i]:
-            raise wrong(f"{name} twice; name each once", i)
+            raise wrong(f"{name} appears twice; name each once", i)
     return raw
 
 
@@ -71,24 +71,24 @@ SAMPLES = 1024
 """Default of `samples`."""
 
 FOREVER = 1e7
-"""What `t_end: .inf` stands for, in sqrt(c/g): longer than any rattleback spins.  A trajectory that has not settled by
-then has the status `time_limit` all the same."""
+"""Value of `t_end: .inf`, in sqrt(c/g): longer than any rattleback spins. A trajectory that has not settled by then has
+the status `time_limit`."""
 
 T_END = 30_000.0
-"""Default of `t_end`, in sqrt(c/g); in SI it is as long for the body."""
+"""Default of `t_end`, in sqrt(c/g); in SI it is converted with the body's c."""
 
 LATER = 1e6
-"""Default of `t_end` where it can be foreseen whether that is of use; that of `patience` is then `T_END`."""
+"""Default of `t_end` where further reversals can be predicted; the default of `patience` is then `T_END`."""
 
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
 MAX_CELLS_IN_MEMORY = 2**24
-"""Most cells of a run of samples or of a refined one, which hold all their arrays in memory."""
+"""Most cells of a sampled or refined run, which holds all its arrays in memory."""
 
 
 def _in_si(raw: Any) -> Any:
-    """A time such as "2 min" in s."""
+    """Return a time such as "2 min" in s."""
     return in_si(TIME, raw)[0]
 
 
@@ -96,19 +96,19 @@ class Integrator(Strict):
     method: Literal[(*METHODS, AUTO)] = Field(  # type: ignore[valid-type]
         default=AUTO, description="integration method; `auto` chooses the faster one for each cell"
     )
-    """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time.  With a number
-    for `step`, and for a model that only one method can integrate, that is the default."""
+    """`auto` takes, for each cell, the method that reaches `t_end` within `tolerance` in the least time. It is the
+    default unless `step` is a number or the model supports only one method."""
     step: Annotated[
         Annotated[float, Field(gt=0)] | Literal["auto"], BeforeValidator(_in_si), Allowed("auto or a finite number > 0")
     ] = Field(default="auto", description="fixed step in sqrt(c/g) or, with `units: SI`, in s; or `auto`")
     tolerance: float = Field(
         default=TOLERANCE, ge=1e-14, lt=1,
-        description="error in spin at t = 400, in sqrt(g/c), that an automatic step is chosen to keep",
+        description="permitted error in spin at t = 400, in sqrt(g/c), from which automatic steps are chosen",
     )  # fmt: skip
     estimate_errors: bool = Field(
         default=True,
-        description="whether each cell is run a second time, in longer steps, which tells its error; cells above "
-        "`tolerance` are then repeated in shorter steps, unless `step` is a number",
+        description="whether each cell is run a second time, with longer steps, to estimate its error; cells above "
+        "`tolerance` are then repeated with shorter steps, unless `step` is a number",
     )
     t_end: Annotated[
         float,
@@ -116,7 +116,7 @@ class Integrator(Strict):
         Allowed(f".inf or a number > 0 and <= {LATEST:g}"),
     ] = Field(
         default=T_END, gt=0, le=LATEST,
-        description=f"time at which a trajectory ends that has not settled, in sqrt(c/g); `.inf` means {FOREVER:g}; "
+        description=f"time at which an unsettled trajectory ends, in sqrt(c/g); `.inf` means {FOREVER:g}; "
         f"with `units: SI` in s, by default {T_END:g} sqrt(c/g) of the largest c and the least gravity, rounded up to "
         f"hundreds, and {LATER:g} sqrt(c/g) where `patience` has a meaning",
     )  # fmt: skip
@@ -127,17 +127,17 @@ class Integrator(Strict):
         f"settled; by default {T_END:g} if `t_end` is left out",
     )  # fmt: skip
     stop_when_settled: bool = Field(
-        default=True, description="whether a trajectory of a sweep ends when neither spin nor count can change any more"
+        default=True, description="whether a trajectory of a sweep ends once spin and count can no longer change"
     )
 
     @property
     def patient(self) -> Integrator:
-        """The same for what is followed in time, or searched: to `patience` at the latest."""
+        """Return the same settings for dense trajectories and searches, with `t_end` no later than `patience`."""
         return self.model_copy(update={"t_end": min(self.t_end, self.patience or self.t_end), "patience": None})
 
 
 def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
-    """The fields of the physical parameters in a section, made from a table of parameters."""
+    """Return the fields of the physical parameters in a section, made from a table of parameters."""
     return {
         p.name: (
             Annotated[Any, BeforeValidator(lambda raw, p=p: parse_values(p, raw)), Field(description=p.long_name)],
@@ -149,7 +149,7 @@ def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
 
 
 def _parts(which: int) -> tuple[str, ...]:
-    """The laws of friction (0), or the regularisations of those that have several (2), from the names of `LAWS`."""
+    """Return the laws of friction (0) or their regularisations, where there are several (2), from `LAWS`."""
     return tuple(dict.fromkeys(part for name in LAWS if (part := name.partition("-")[which])))
 
 
@@ -161,7 +161,7 @@ class Friction(Strict):
 
     @property
     def name(self) -> str:
-        """The name of the law in `sweep.models.general.laws.LAWS`."""
+        """Return the name of the law in `sweep.models.general.laws.LAWS`."""
         return self.law if self.law in LAWS else f"{self.law}-{self.regularisation}"
 
     @model_validator(mode="after")
@@ -175,12 +175,12 @@ class Friction(Strict):
 
 class Body(Strict):
     surface: Literal[tuple(SURFACES)] = Field(  # type: ignore[valid-type]
-        default=ELLIPSOID.name, description="surface of the body, which says what `a`, `b` and `c` mean"
+        default=ELLIPSOID.name, description="surface of the body, which defines the meaning of `a`, `b` and `c`"
     )
 
 
 _WORDS: dict[str, type[Strict]] = {"body": Body, "friction": Friction}
-"""What sections have beside physical parameters: most have nothing."""
+"""The keys of sections besides physical parameters."""
 
 
 class _Top(Strict):
@@ -188,15 +188,15 @@ class _Top(Strict):
         str, Allowed("up to 100 letters, digits, '.', '_' or '-', not '.', '_' or '-' first, in quotes if a number")
     ] = Field(
         default="", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$",
-        description="name of the run and of its files; by default that of the configuration file",
+        description="name of the run and its files; by default the name of the configuration file",
     )  # fmt: skip
     model: Annotated[
         Literal[tuple(TIERS)],  # type: ignore[valid-type]
         Allowed(f"{', '.join(TIERS)}, a Python file such as my_model.py or an entry point of a package"),
-    ] = Field(default="slip", description="which model to integrate; the code of a file or a package is run")
+    ] = Field(default="slip", description="model to integrate; the code of a file or a package is run")
     model_sha256: Annotated[str | None, Allowed("64 hexadecimal digits")] = Field(
         default=None, pattern="^[0-9a-f]{64}$",
-        description="SHA-256 that the file or the package of `model` has to have; a dataset tells its own",
+        description="SHA-256 that the file or package of `model` must have; datasets record it",
     )  # fmt: skip
     units: Literal[PAPER_UNITS, SI] = Field(  # type: ignore[valid-type]
         default=PAPER_UNITS, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
@@ -212,26 +212,25 @@ class _Top(Strict):
     )
     picture: Annotated[
         list[str] | None, BeforeValidator(_each_once), Allowed("a list of variables, such as [reversals, spin_mean]")
-    ] = Field(default=None, description="variables that `run` draws; by default what `measure` names first")
+    ] = Field(default=None, description="variables that `run` draws; by default the first ones in `measure`")
     samples: Annotated[Whole | None, Allowed(f"a whole number >= 1 and <= {MAX_AXIS}")] = Field(
         default=None, ge=1, le=MAX_AXIS,
-        description="how many samples to draw of the parameters that are given as distributions; by default "
-        f"{SAMPLES} if there is one",
+        description=f"number of samples to draw from the distributions; by default {SAMPLES} if there are any",
     )  # fmt: skip
-    seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples; the same gives the same")
+    seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples, which makes them reproducible")
     refine: Whole = Field(
         default=0, ge=0, le=MAX_CELLS_IN_MEMORY.bit_length() - 1,
-        description="of each range every 2^refine-th value is simulated first, and then what lies near changes of the "
+        description="every 2^refine-th value of each range is simulated first, then the cells near changes of the "
         "count; 0 simulates every cell",
     )  # fmt: skip
     max_failed_fraction: float = Field(
-        default=0.01, ge=0, le=1, description="share of failed cells beyond which the command exits with 3"
+        default=0.01, ge=0, le=1, description="fraction of failed cells above which the command exits with code 3"
     )
 
 
 @cache
 def schema_of(origin: Origin | None) -> Any:
-    """The schema of the configurations of a user's model, or, without one, of the models of this package."""
+    """Return the schema of configurations of a user's model, or, without one, of the models of this package."""
     table = loading.table(origin)
     words = _WORDS if not origin else {"body": Body} if loading.law(origin) else {}
     found: dict[str, Any] = {}
@@ -247,8 +246,8 @@ SETTINGS: dict[str, FieldInfo] = {name: field for name, field in _Top.model_fiel
 for _name, _words in _WORDS.items():
     SETTINGS |= {f"{_name}.{name}": field for name, field in _words.model_fields.items()}
 SETTINGS |= {f"integrator.{name}": field for name, field in Integrator.model_fields.items()}
-"""All values of a configuration but the physical parameters, by path; the `description` of each says what it means."""
+"""All values of a configuration except the physical parameters, by path, each with its `description`."""
 
 PATHS: dict[str, str] = {p.path: p.meaning for p in PARAMETERS.values()}
 PATHS |= {path: str(field.description) for path, field in SETTINGS.items()}
-"""The path of every value of a configuration, and what it means."""
+"""The path of every value of a configuration, with its meaning."""

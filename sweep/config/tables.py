@@ -1,4 +1,4 @@
-"""Tables of numbers as spreadsheets, phones and trackers write them: tables of cases, and films."""
+"""Reads tables of numbers as spreadsheets, phones and trackers write them: tables of cases, and films."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from sweep.faults import ConfigError, Fault, brief, either, fault_of
 from sweep.units import WRITTEN, Unit, factor, number, unit_of
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
-"""What may stand between columns."""
+"""Permitted separators between columns."""
 
 GAPS = frozenset({"", "-", "nan", "na", "n/a", "null", "none"})
-"""What cells without a number hold, in lower case."""
+"""Contents of cells without a number, in lower case."""
 
 _ENOUGH = 100_000
-"""Characters of a line in which separators are looked for."""
+"""Number of characters of a line in which separators are looked for."""
 
 _COMMA = re.compile(r"[-+−]?[0-9]*(?:,[0-9]+)+(?:[eE][-+−]?[0-9]+)?")
 _THOUSANDS = re.compile(r"[-+−]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
@@ -25,34 +25,34 @@ _THOUSANDS = re.compile(r"[-+−]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 @dataclass(frozen=True)
 class Table:
-    """The text of the cells of a table, of which all rows have as many as its header."""
+    """The text of the cells of a table; all rows have as many cells as the header."""
 
     file: str
     separator: str
     top: int
-    """Line of the header."""
+    """Line number of the header."""
     names: list[str]
-    """Names of the columns, without the unit in brackets behind them."""
+    """Names of the columns, without the unit in brackets after them."""
     units: list[str]
     """Units of the columns, from the header or the row below it; "" where there is none."""
     under: int
-    """Line of the row of units, or of the header if there is none."""
+    """Line number of the row of units, or of the header if there is none."""
     lines: list[int]
-    """The line of each row."""
+    """Line number of each row."""
     rows: list[list[str]]
 
     def fault(self, message: str, column: int, row: int | None = None) -> Fault:
-        """A fault of a column or of one of its cells; both count from zero."""
+        """Return a fault of a column or of one of its cells; both are counted from zero."""
         line = self.top if row is None else self.lines[row]
         return Fault(self.file, line, column + 1, (self.names[column],), message)
 
     def scale(self, column: int, units: Unit | str) -> float:
-        """How many units of SI the numbers of a column are in; one if the table gives no unit.
+        """Return the factor that converts a column to SI; one if the table gives no unit.
 
         Raises
         ------
         ConfigError
-            if the table gives a unit of something else.
+            if the table gives a unit of another quantity.
         """
         if not (written := self.units[column]):
             return 1.0
@@ -66,19 +66,19 @@ class Table:
         return found
 
     def numbers(self, column: int) -> list[float | str]:
-        """The numbers of a column, and the texts of cells that hold none.
+        """Return the numbers of a column, and the texts of cells that do not hold a number.
 
         Raises
         ------
         ConfigError
-            if commas may be decimal or set off thousands: a column is read as a whole or not at all.
+            if commas may be decimal commas or thousands separators: a column is read as a whole or not at all.
         """
         cells = [row[column] for row in self.rows]
         if commas := [cell for cell in cells if _COMMA.fullmatch(cell)]:
             if pointed := next(
                 (cell for cell in cells if "." in cell and number(cell.replace(",", "")) is not None), ""
             ):
-                words = f"has {commas[0]!r} and {pointed!r}; write decimal points alone, and no comma for thousands"
+                words = f"has {commas[0]!r} and {pointed!r}; use decimal points only, and no thousands separators"
                 raise ConfigError([self.fault(words, column)])
             if self.separator != ";" and all(map(_THOUSANDS.fullmatch, commas)):
                 plain = commas[0].replace(",", ".", 1), commas[0].replace(",", "")
@@ -91,19 +91,19 @@ class Table:
 
 
 NAMED = re.compile(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", re.DOTALL)
-"""A name, perhaps with a unit in parentheses behind it."""
+"""Split a name from the unit in parentheses that may follow it."""
 
 Lines = list[tuple[int, list[str]]]
-"""The cells of lines, each with its number."""
+"""Return the cells of lines, each with its line number."""
 
 
 def read(file: str, text: str) -> Table:
-    """Take a table apart: a line of names, perhaps one of units, and rows with a cell for each name.
+    """Parse a table: a line of names, optionally a line of units, and rows with a cell for each name.
 
     Raises
     ------
     ConfigError
-        if a line has another number of cells than the first, or a column is given two units.
+        if a line has a different number of cells from the first, or a column has two units.
     """
     separator, ((top, header), *rows) = _lines(file, text)
     _require_even(file, (top, header), rows, separator)
@@ -117,7 +117,7 @@ def read(file: str, text: str) -> Table:
 
 
 def _lines(file: str, text: str) -> tuple[str, Lines]:
-    """Divide the lines that are not empty into cells, and find their separator; a `ConfigError` if there are none."""
+    """Split the non-empty lines into cells, and find their separator; raise a `ConfigError` if there are none."""
     try:
         separator = _separator(text)
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True, strict=True)
@@ -130,19 +130,20 @@ def _lines(file: str, text: str) -> tuple[str, Lines]:
 
 
 def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separator: str) -> None:
-    """Raise a `ConfigError` if a row has another number of cells than the header."""
+    """Raise a `ConfigError` if a row has a different number of cells from the header."""
     top, columns = header[0], len(header[1])
     if not (ragged := [(line, len(row)) for line, row in rows if len(row) != columns]):
         return
     line, values = ragged[0]
     words = f"{values} values, but {columns} columns in line {top}, with {SEPARATORS[separator]} between them"
-    words += f"; so it is in {len(ragged)} of {len(rows)} rows" if len(ragged) > 1 else ""
-    words += "; put semicolons if numbers have decimal commas" if separator == "," and values > columns else ""
+    words += f"; {len(ragged)} of {len(rows)} rows are like this" if len(ragged) > 1 else ""
+    if separator == "," and values > columns:
+        words += "; use semicolons between columns if numbers have decimal commas"
     raise fault_of(words, file=file, line=line)
 
 
 def _united(file: str, names: list[str], over: tuple[int, list[str]], under: tuple[int, list[str]]) -> list[str]:
-    """Return the units in the header, `over`, and in the row below it; a `ConfigError` where these differ."""
+    """Return the units in the header (`over`) and in the row below it; raise a `ConfigError` where they differ."""
     (top, units), (line, below) = over, under
     for column, (unit, own) in enumerate(zip(units, below, strict=True)):
         if unit and own and unit != own:
@@ -152,7 +153,7 @@ def _united(file: str, names: list[str], over: tuple[int, list[str]], under: tup
 
 
 def _separator(text: str) -> str:
-    """What stands between the columns: it divides the first line, and the next one into as many cells."""
+    """Return the column separator: it splits the first line and the next one into the same number of cells."""
     first = [line[:_ENOUGH] for line in text.lstrip().split("\n", 2)[:2] if line.strip()]
 
     def divided(mark: str) -> tuple[bool, int]:
@@ -163,6 +164,6 @@ def _separator(text: str) -> str:
 
 
 def _is_of_units(row: list[str]) -> bool:
-    """Tell whether a row holds units: text, and no number."""
+    """Return whether a row holds units: text, and no number."""
     cells = [cell for cell in row if cell.lower() not in GAPS]
     return bool(cells) and not any(re.fullmatch(r"[-+−.,eE0-9]*[0-9][-+−.,eE0-9]*", cell) for cell in cells)

@@ -1,6 +1,6 @@
-"""The model that a configuration names, if it is none of the package's: a Python file, or an entry point.
+"""Loads a user-defined model that a configuration names: a Python file, or an entry point.
 
-Its code runs as soon as the configuration is read, so that a configuration from a dataset must not name one.
+Its code runs as soon as the configuration is read, so a configuration taken from a dataset must not name one.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ SUFFIX = ".py"
 TAKEN = frozenset({path.rpartition(".")[2] for path in (*SETTINGS, *ENDED)}) | {
     "integrator", CASE, SAMPLE, "trajectory", "time",
 }  # fmt: skip
-"""Names that mean something else in a configuration, or as a dimension.  A user's parameter cannot have them."""
+"""Names with another meaning in a configuration or as a dimension, which a user's parameter cannot have."""
 
 
 def named(source: Document, announce: Callable[[str], None] | None) -> Origin | None:
-    """Run the model of a document and say where it comes from; None if it is one of the package's, or unknown.
+    """Load the user-defined model of a document and return its origin; None if the model is built in or unknown.
 
     Parameters
     ----------
-    announce : told in words that the code is about to run; None if it must not
+    announce : called with a message before the code runs; None if it must not run
 
     Raises
     ------
@@ -44,28 +44,29 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         return None
     origin: Origin | None = source.known.get(("model", name))
     if origin is None and not name.endswith(SUFFIX) and (origin := loading.entry_point(name)) is None:
-        return None  # the schema refuses it
+        return None  # the schema refuses it later
     if announce is None:
-        words = "code of a user, which is not run for a configuration that comes from a dataset"
-        raise ConfigError([source.fault(("model",), f"{brief(name)}: {words}; choose {either(TIERS)}")])
+        message = "refusing to run user code named inside a dataset"
+        raise ConfigError([source.fault(("model",), f"{brief(name)}: {message}; choose {either(TIERS)}")])
     if origin is None:
         path, text = source.read_beside("model", name)
         origin = Origin.of_file(name, str(path), text)
     source.known["model", name] = origin
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
-        words = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
-        raise ConfigError([source.fault(("model_sha256",), words)])
+        message = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
+        raise ConfigError([source.fault(("model_sha256",), message)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     for p in loading.load(origin).own_parameters:
         if wrong := [word for word in (p.name, p.section) if word in TAKEN]:
-            words = f"parameter {p.path}: {wrong[0]!r} means something else already; rename it"
-            raise fault_of(words, file=origin.place)
+            message = f"parameter {p.path}: {wrong[0]!r} already has another meaning; rename it"
+            raise fault_of(message, file=origin.place)
     return origin
 
 
 def try_out(config: Config) -> None:
-    """Call the functions of a user's model for the first and the last cell; `ConfigError` if they do not work."""
+    """Call the functions of a user's model for the first and the last cell; raise a `ConfigError` if they do not
+    work."""
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in config.cases.items()}

@@ -1,4 +1,4 @@
-"""The value of a physical parameter: a number, an axis given as a list or a range, or a distribution."""
+"""Reads the value of a physical parameter: a number, an axis given as a list or a range, or a distribution."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from sweep.config.distributions import FAMILIES, Distribution
 from sweep.config.document import is_number, number, plain_data
-from sweep.config.messages import describe, wrong
+from sweep.config.messages import explain, wrong
 from sweep.faults import either, fault_of, refusal
 from sweep.parameters import Parameter
 from sweep.units import ANGLE, NUMERAL, WRITTEN, Unit, quantity, unit_in, unit_of
@@ -21,26 +21,26 @@ from sweep.units import ANGLE, NUMERAL, WRITTEN, Unit, quantity, unit_in, unit_o
 _MORE = ", a list of numbers, {start, stop, num, spacing: linear|log}, or {normal: [mean, standard deviation]}"
 
 MAX_AXIS = 1_000_000
-"""Most values of one axis and most rows of a table of cases: they are held in memory as Python numbers."""
+"""Most values of one axis and most rows of a table of cases, which are held in memory as Python numbers."""
 
 
 class Strict(BaseModel):
-    """A part of the schema: no value is converted, and no key is unknown."""
+    """A section of the schema; values are not converted, and unknown keys are refused."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 def whole(raw: Any) -> Any:
-    """1e3 as 1000."""
+    """Return a float such as 1e3 as the integer 1000."""
     return int(raw) if isinstance(raw, float) and raw.is_integer() else raw
 
 
 Whole = Annotated[int, BeforeValidator(whole)]
-"""A whole number, however it is written."""
+"""A whole number, in whatever notation."""
 
 
 class Range(Strict):
-    """`num` numbers from `start` to `stop`."""
+    """A range of `num` numbers from `start` to `stop`."""
 
     start: float
     stop: float
@@ -51,14 +51,14 @@ class Range(Strict):
         if self.spacing == "linear":
             return _divided(self.start, self.stop, self.num)
         if not (min(self.start, self.stop) > 0 or max(self.start, self.stop) < 0):
-            raise wrong("a log range needs start and stop of one sign, both not zero", "spacing")
+            raise wrong("a log range needs start and stop of the same sign, and neither zero", "spacing")
         logs = _divided(math.log10(abs(self.start)), math.log10(abs(self.stop)), self.num)
         inside = [math.copysign(10.0**log, self.start) for log in logs[1:-1]]
         return [self.start, *inside, self.stop][: self.num]
 
 
 def _divided(start: float, stop: float, num: int) -> list[float]:
-    """Equally spaced numbers, each rounded once, so that a finer division has all numbers of a coarser one."""
+    """Return equally spaced numbers, each rounded once, so that a finer division contains a coarser one."""
     if num == 1:
         return [start]
     (p, q), (r, s) = start.as_integer_ratio(), stop.as_integer_ratio()
@@ -71,22 +71,22 @@ class Values:
     """A parameter's checked value: one number, an axis of distinct numbers, or a distribution."""
 
     numbers: tuple[float, ...]
-    """Of a distribution its median."""
+    """The number or numbers; of a distribution, the median."""
     is_axis: bool
     spec: float | list[float] | dict[str, Any]
-    """The value as it stands in the configuration."""
+    """The value as written in the configuration."""
     distribution: Distribution | None = None
     unit: str = field(default="", compare=False)
-    """The unit other than an angle's in which the configuration has it; "" if it has none."""
+    """The unit in the configuration, except for angles; "" if it has none."""
 
     @classmethod
     def one(cls, number: float) -> Values:
-        """A single number."""
+        """Return the value, which must be a single number."""
         return cls((number,), False, number)
 
 
 def parse_values(parameter: Parameter, raw: Any) -> Values:
-    """The value of a parameter from what a configuration says; `wrong` tells what is wrong with it."""
+    """Return the value of a parameter given in a configuration; `wrong` makes the error."""
     raw, written = in_si(parameter.units, raw)
     return replace(_parse(parameter, raw), unit=written)
 
@@ -105,9 +105,9 @@ def _parse(parameter: Parameter, raw: Any) -> Values:
 
 
 def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], str]) -> tuple[float, ...]:
-    """The numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter.
+    """Return the numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter.
 
-    `unitless`, such as `Config.unitless`, says why it cannot have a unit.
+    `unitless`, such as `Config.unitless`, says why the parameter cannot have a unit.
     """
     try:
         values = parse_values(parameter, plain_data(raw))
@@ -120,23 +120,23 @@ def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], st
 
 
 def in_si(units: Unit | str, raw: Any) -> tuple[Any, str]:
-    """`raw` with numbers of SI for texts such as "0.5 deg", also in a list, a range or a distribution.
+    """Convert texts with units, such as "0.5 deg", to numbers in SI, also in a list, a range or a distribution.
 
     Returns
     -------
-    Second, a unit that is no angle's and was converted, as the user wrote it; "" if there is none, or if a user's model
+    The converted value, and the unit as the user wrote it, except for angles; "" if there is none, or if a user's model
     gives `units` as text, which are the same in all systems.
     """
     unit = unit_of(units)
     seen: list[str] = []
 
     def convert(part: Any, key: str = "") -> Any:
-        if isinstance(part, list):  # of a lognormal distribution the second is a pure number
+        if isinstance(part, list):  # the second parameter of a lognormal distribution is dimensionless
             return [item if key == "lognormal" and i else convert(item) for i, item in enumerate(part)]
         if isinstance(part, dict):
             return {key: convert(item, key) for key, item in part.items()}
         found = quantity(part, unit) if unit and isinstance(part, str) else None
-        if not found or found[1]:  # an error is for a distribution
+        if not found or found[1]:  # only distributions have errors
             return part
         if unit != ANGLE and units is unit:
             seen.append(unit_in(part))
@@ -149,8 +149,8 @@ def _parse_range(parameter: Parameter, raw: dict[str, Any]) -> Values:
     try:
         span = Range.model_validate(raw)
     except ValidationError as error:
-        # An unknown key first: it tells why another is missing.
-        path, (message, _) = max(describe(error.errors(), Range).items(), key=lambda found: found[1][1])
+        # Report an unknown key first: it explains why another is missing.
+        path, (message, _) = max(explain(error.errors(), Range).items(), key=lambda found: found[1][1])
         raise wrong(message, *path) from None
     for value in (numbers := span.values()):
         if not parameter.allows(value):
@@ -184,14 +184,14 @@ _COMMA = re.compile(r" *([-+−]?[0-9]*),([0-9]+)(.*)")
 
 
 def instead(raw: Any, parameter: Parameter) -> str:
-    """Words to add to the refusal of a text that is nearly a number, a range or a quantity; "" if it is none."""
+    """Return a hint to add when a text is nearly a number, a range or a quantity; "" if it is not."""
     if not isinstance(raw, str):
         return ""
     if (unit := unit_of(parameter.units)) and quantity(raw, unit):
-        return "; an error belongs into {normal: [value, error]}"
+        return "; write an error as {normal: [value, error]}"
     if span := _SPAN.fullmatch(raw):
         start, stop, num = span[1], span[2], span[3] or "41"
-        needed = "" if span[3] else " and needs the number of its values"
+        needed = "" if span[3] else ", with the number of values"
         return f"; a range is written {{start: {start}, stop: {stop}, num: {num}}}{needed}"
     if comma := _COMMA.fullmatch(raw):
         whole, part, rest = comma.groups()

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numba
 
 from sweep.config import Config
-from sweep.engine.local import Done, run_batch
+from sweep.engine.local import Done, run_batch, split
 from sweep.engine.plan import kernels
 from sweep.grid import Tile
 from sweep.interrupt import point
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE = "10s"
-"""How long to wait for a scheduler to answer."""
+"""Seconds to wait for a scheduler to answer."""
 
 _POLL = 0.01
-"""Time in seconds between two looks at whether a tile has come back."""
+"""Seconds between two checks whether a tile has come back."""
 
 _CELLS_A_LANE, _TASKS_A_WORKER = 32, 4
-"""Cells of a task for each lane of a worker, unless that would leave a worker fewer tasks than the second."""
+"""Cells of a task for each lane of a worker, and the least number of tasks for each worker, which takes precedence."""
 
 _LOST = "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run"
 
@@ -56,7 +56,7 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
         build(kernels(config), APPROACH)  # once, into the cache that those workers read
     # A task's result rather than scattered data, which would be lost along with the workers that hold it.
     shared = client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
-    numbers = {client.submit(_work, shared, some, pure=False): some for some in _together(client, config, tiles, todo)}
+    numbers = {client.submit(_work, shared, some, pure=False): some for some in _tasks(client, config, tiles, todo)}
     for future in _arriving(as_completed(numbers, loop=client.loop)):
         try:
             done: list[Done] = future.result()
@@ -70,17 +70,15 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
         yield from done
 
 
-def _together(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[Sequence[int]]:
-    """Divide `todo` among tasks: as many cells in each as keep the lanes of a worker full, but some tasks a worker."""
+def _tasks(client: Client, config: Config, tiles: Sequence[Tile], todo: Sequence[int]) -> Iterator[list[int]]:
+    """Divide `todo` among tasks: enough cells in each to fill the lanes of a worker, but several for each worker."""
     threads = [*client.nthreads().values()] or [1]
-    largest = max((config.grid.part(tiles[i]).size for i in todo), default=1)
-    enough = max(threads) * LANES * _CELLS_A_LANE // largest
-    together = max(1, min(enough, len(todo) // (_TASKS_A_WORKER * len(threads))))
-    return (todo[first : first + together] for first in range(0, len(todo), together))
+    cells = max(threads) * LANES * _CELLS_A_LANE
+    return split(config.grid, tiles, todo, cells, len(todo) // (_TASKS_A_WORKER * len(threads)))
 
 
 def _on_this_machine(client: Client) -> bool:
-    """Tell whether any worker runs on the machine of this process."""
+    """Return whether any worker runs on the machine of this process."""
     from distributed.comm import get_address_host
     from distributed.utils import get_ip
 
@@ -88,7 +86,7 @@ def _on_this_machine(client: Client) -> bool:
 
 
 def _arriving(running: Any) -> Iterator[Any]:
-    """Futures in the order in which they are done."""
+    """Yield futures in the order in which they finish."""
     while not running.is_empty():
         while not running.has_ready():
             time.sleep(_POLL)
@@ -97,14 +95,14 @@ def _arriving(running: Any) -> Iterator[Any]:
 
 
 Shared = tuple[Config, list[Tile], Identity]
-"""What the tasks of a run have in common."""
+"""What all tasks of a run share."""
 
 
 # Kernels of several tasks at once would share threads, which not all of numba's threading layers allow.
 _one_tile = threading.Lock()
 
 
-def _work(shared: Shared, together: Sequence[int]) -> list[Done]:
+def _work(shared: Shared, batch: Sequence[int]) -> list[Done]:
     from distributed import get_worker
 
     config, tiles, identity = shared
@@ -114,12 +112,12 @@ def _work(shared: Shared, together: Sequence[int]) -> list[Done]:
     with _one_tile:
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         numba.set_num_threads(min(get_worker().state.nthreads, most))
-        return list(run_batch(config, tiles, together))
+        return list(run_batch(config, tiles, batch))
 
 
 @contextmanager
 def connected(client: Client | str | None) -> Iterator[Client | None]:
-    """Connect to the scheduler at an address; a client, or None, is handed on as it is.
+    """Connect to the scheduler at an address; a client, or None, is returned unchanged.
 
     Raises
     ------
@@ -132,13 +130,13 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
     try:
         import distributed
     except ModuleNotFoundError:
-        words = "needs distributed, which is not installed: pip install 'dask[distributed]'"
-        raise StoreError(f"{client}: {words}") from None
+        message = "needs distributed, which is not installed: pip install 'dask[distributed]'"
+        raise StoreError(f"{client}: {message}") from None
 
-    for logger in ("distributed", "distributed.client"):  # what a user has to know is raised as an error
+    for logger in ("distributed", "distributed.client"):  # user-visible problems are raised as errors
         logging.getLogger(logger).setLevel("CRITICAL")
     try:
-        # A client that is given a wrong address waits 20 s for itself when it is collected, and prints a traceback.
+        # When collected, a client with a wrong address would wait for itself for 20 s, and print a traceback.
         distributed.comm.resolve_address(client)
         there = distributed.Client(client, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

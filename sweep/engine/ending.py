@@ -1,9 +1,9 @@
-"""Decides when a run is over: when the count is final, or when nothing tells when that will be.
+"""Decides when a run is over: when the count is final, or when it cannot be predicted to become final.
 
-The kernel lets a cell settle by a bound on what the energy of its rattle can do to the spin (`sweep.kernels.lanes`), or
-by how a rattle that rolls round and round winds down (`sweep.kernels.measures.decay`).  Where the bound fails, the cell
-goes on.  A cell that has not settled by the configuration's `patience` goes on to `t_end` only if its spin will reverse
-once more by the slow equations, or if its rattle will have wound down before.
+The kernel settles a cell by a bound on what the energy of its rattle can do to the spin (`sweep.kernels.lanes`), or by
+how a rattle that rolls round and round winds down (`sweep.kernels.measures.decay`). Where the bound fails, the cell
+continues. A cell that has not settled by the configuration's `patience` continues to `t_end` only if the slow equations
+predict that its spin will reverse once more, or that its rattle will have wound down before then.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from sweep.engine.lives import RUN, Lives
 from sweep.engine.winding import watch, whole_blocks, winds_down
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.layout import Table
 from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
@@ -26,15 +25,15 @@ from sweep.models.theory import linear
 FIRST, LATER = range(2)
 """Legs of a run: to `patience`, and to `t_end`."""
 
-# How many times the change of the spin at the present rates may be exceeded, where no slow equations hold.
+# Safety factor on the change of the spin at the present rates, where the slow equations do not hold.
 _REACH = 4.0
 
-# Error of the slow equations in spin, relative to the fastest spin that the energy allows: at least this, and so many
-# times what they neglect.  Of 576 cells of `configs/mu_b.yaml` at n0 = 0.05, stopped at t = 5000 and at 30 000, none
-# that this settled had another count at t = 10⁶.
+# Least error of the slow equations in spin, relative to the fastest spin that the energy allows, and its ratio to the
+# neglected terms. Of 576 cells of `configs/mu_b.yaml` at n0 = 0.05, stopped at t = 5000 and at 30 000, none that was
+# settled this way had another count at t = 10⁶.
 _LEAST, _NEGLECTED = 0.02, 3.0
 
-# Where the error is larger than this share, the slow equations foresee nothing.
+# Above this relative error, the slow equations predict nothing.
 _LARGEST = 0.2
 
 
@@ -50,7 +49,7 @@ def begin(lives: Lives, rows: Array, images: Array, most: Array | float = np.inf
 
 
 def over(lives: Lives, rows: Array) -> Array:
-    """Find the runs that are over, out of those of the cells `rows`, which have stopped; the others go on.
+    """Find which of the cells `rows`, which have stopped, are finished; the others continue.
 
     Returns
     -------
@@ -68,7 +67,7 @@ def over(lives: Lives, rows: Array) -> Array:
 
 
 def _go_on(lives: Lives, rows: Array, *, settles: bool) -> None:
-    """Let the cells `rows` run on, to `t_end` if they may settle, and else on the same leg without settling."""
+    """Let the cells `rows` run on, to `t_end` if they may settle, and otherwise on the same leg without settling."""
     table = lives.table(rows)
     table["status"], table["settles"] = RUNNING, settles
     lives.notes["wary"][rows] = not settles
@@ -78,19 +77,19 @@ def _go_on(lives: Lives, rows: Array, *, settles: bool) -> None:
 
 
 def too_early(cells: Cells, which: Array | bool = True) -> Array:
-    """Tell which cells of a mask have settled although their spin may reverse once more, shape (cells,).
+    """Return which cells of a mask have settled although their spin may reverse once more, shape (cells,).
 
-    The bound of the kernel fails where a strong rattle hardly decays, and turns the spin all the while, and where
-    friction is too weak to stop the slip.  The slow equations foresee what comes; where they do not hold, the spin must
-    keep its sign, and the rattle decay, even if the rattle changes the spin `_REACH` times as much as at its present
-    rates; unless it rolls round, and was watched.
+    The bound of the kernel fails if a strong rattle hardly decays and keeps turning the spin, and if friction is too
+    weak to stop the slip. The slow equations then predict the further course. Where they do not hold, the spin must
+    keep its sign, and the rattle decay, even at `_REACH` times the present rate of change; unless it rolls round, and
+    was watched.
     """
     settled = which & (cells.status == SETTLED)
     if MODES not in cells.kernel.model.offers or not settled.any():
         return np.zeros(len(settled), bool)
     table = cells.kernel.table(cells.images)
     left = endings(table, settled).reversals
-    wound = _wound(table)
+    wound = cells.recorded(WOUND) > 0
     early, unknown = left > 0, np.flatnonzero(settled & np.isnan(left) & ~wound)
     early[wound] &= _error(cells)[0][wound] < _LARGEST
     if len(unknown):
@@ -99,7 +98,7 @@ def too_early(cells: Cells, which: Array | bool = True) -> Array:
 
 
 def _stays(model: Model, kernel: Kernel, images: Array) -> Array:
-    """Tell where the spin keeps its sign and the rattle decays even at `_REACH` times the change foreseen."""
+    """Return where the spin keeps its sign and the rattle decays even at `_REACH` times the predicted change."""
     constants = kernel.unpack(images)[1]
     states = kernel.model_states(images)
     spin, _, _ = model.energy(tuple(states), constants)
@@ -110,17 +109,17 @@ def _stays(model: Model, kernel: Kernel, images: Array) -> Array:
 
 
 def _late(cells: Cells) -> Array:
-    """Tell which cells are at their limit of time, and can be shown to have settled, shape (cells,)."""
+    """Return which cells have reached their time limit and can be shown to have settled, shape (cells,)."""
     known = MODES in cells.kernel.model.offers and "reversals" in cells.kernel.measure
     return np.asarray((cells.status == TIME_LIMIT) & known)
 
 
 def settle(cells: Cells, which: Array | bool = True) -> Array:
-    """Settle those cells of a mask, at their limit of time, that can be shown to reverse no more, in place.
+    """Settle, in place, the cells of a mask that are at their time limit and can be shown to reverse no more.
 
     Returns
     -------
-    Where a further reversal can be foreseen, shape (cells,).
+    A mask of the cells with a predictable further reversal, shape (cells,).
     """
     table, late = cells.kernel.table(cells.images), which & _late(cells)
     if not late.any():
@@ -129,16 +128,11 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
     error, fastest = _error(cells)
     final = (left.reversals == 0) & (left.nearest_approach > error * fastest)
     foreseen = late & ~final & np.isfinite(left.reversals) & (error < _LARGEST)
-    table["status"][late & ~foreseen & (final | _wound(table))] = SETTLED
+    table["status"][late & ~foreseen & (final | (cells.recorded(WOUND) > 0))] = SETTLED
     return np.asarray(foreseen)
 
 
 def _error(cells: Cells) -> tuple[Array, Array]:
-    """Relative error of what the slow equations foresee, and the fastest spin that the energy allows, (cells,)."""
+    """Return the relative error of the slow equations, and the fastest spin that the energy allows, (cells,)."""
     fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / cells.inertia)
     return np.maximum(_NEGLECTED * bending(cells.model, cells.columns) * fastest**2, _LEAST), fastest
-
-
-def _wound(table: Table) -> Array:
-    """Tell which rattles were watched, and will wind down without a reversal, shape (cells,)."""
-    return np.asarray(table[WOUND] > 0) if WOUND in table.layout else np.zeros(len(table.images), bool)

@@ -1,4 +1,4 @@
-"""A run that takes over what an earlier one has computed, from the dataset that it has left, and simulates the rest."""
+"""Reuses the results of an earlier run from its dataset, and simulates the rest."""
 
 from __future__ import annotations
 
@@ -30,32 +30,32 @@ from sweep.results.provenance import identify
 from sweep.results.store import Store
 
 RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
-"""Names of the cells that a run can be asked to compute again, with their statuses."""
+"""Groups of cells that a run can be asked to repeat, with their statuses."""
 
-# What may differ between a run and the one that it enlarges; one that computes cells again may change the integrator.
+# Settings that may differ between a run and the one that it enlarges; repeating cells may change the integrator.
 _FREE = {"name", "max_failed_fraction", "picture", "measure", "samples", "seed", "integrator.t_end"}
 
 
 @dataclass(frozen=True)
 class Earlier:
-    """The dataset of an earlier run, and which cells of this one it has."""
+    """The dataset of an earlier run, and the cells of this run that it contains."""
 
     dataset: xr.Dataset
     cells: Array
     """For each cell of this run its index in the earlier one, or -1 if it has to be simulated, shape (cells,)."""
     rerun: str | None = None
-    """Which cells are computed again, if others are taken over although the settings differ."""
+    """Which cells are repeated, if others are reused although the settings differ."""
 
     @property
     def words(self) -> str:
-        """How many cells are taken over, and from which run."""
+        """Say how many cells are reused, and from which run."""
         taken, created = int((self.cells >= 0).sum()), self.dataset.attrs.get("created", "an unknown date")
         if not taken:
-            return f"no cell of the run of {created} can be taken over; all are simulated"
-        return f"{taken} of {len(self.cells)} cells are taken over from the run of {created}"
+            return f"no cell of the run of {created} can be reused; all are simulated"
+        return f"{taken} of {len(self.cells)} cells are reused from the run of {created}"
 
     def taken(self) -> tuple[Array, dict[str, Array]]:
-        """The cells of this run that are taken over, and the earlier variables of these, by name."""
+        """Return the reused cells of this run, and the earlier variables of these, by name."""
         cells, arrays = np.flatnonzero(self.cells >= 0), dict[str, Array]()
         if not len(cells):
             return cells, arrays
@@ -68,10 +68,10 @@ class Earlier:
 
 
 def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.Dataset, rerun: str | None) -> str:
-    """Why a run of `config` may not replace the dataset `there`, of the run `found`; "" if it may.
+    """Say why a run of `config` may not replace the dataset `there`, of the run `found`; return "" if it may.
 
-    It may if no result is lost: the same run of more cells, to a later time, or with more measurements; or, to
-    `rerun` cells, one of the same cells.
+    It may if no result is lost: the same run with more cells, to a later time, or with more measurements; or, when
+    `rerun` cells are repeated, one with the same cells.
     """
     same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
     if rerun is None and not (same_program and found.of_one_run):
@@ -80,7 +80,7 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     if _is_edited(config, there):
         return edited
     old, new = (_settings(_document(each.config), config.table) for each in (found, wanted))
-    # Of a user's model, `model_sha256` tells what `model` only names.
+    # In a user-defined model, `model_sha256` identifies what `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
     changed |= {"film"} if config.film and there.attrs.get("film_sha256", "") not in ("", config.film.sha256) else set()
@@ -97,10 +97,10 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
 
 
 def _is_edited(config: Config, there: xr.Dataset) -> bool:
-    """Tell whether a dataset lacks what a run writes, or has it in another type or order, so that nothing is taken."""
+    """Return whether a dataset lacks a variable that a run writes, or has it in another type or order."""
     try:
         grid = _grid(there)
-    except KeyError:  # no status, or a dimension without values
+    except KeyError:  # no status, or an empty dimension
         return True
     measured = {spec.partition("=")[0] for spec in str(there.attrs.get("measured", "")).split()}
     kinds = [MEASURES[each] for each in measured & MEASURES.keys()]
@@ -117,14 +117,14 @@ def _is_edited(config: Config, there: xr.Dataset) -> bool:
 
 
 def is_whole(config: Config, path: Path) -> bool:
-    """Tell whether the dataset of the run of `config` has all its cells: it may have been cut since."""
+    """Return whether the dataset of the run of `config` is complete: it may have been cut since."""
     with open_dataset(path, load=False) as there:
         sizes = dict(there["status"].sizes) if "status" in there else {"": 0}
     return sizes == dict(zip(config.grid.dims, config.grid.shape, strict=True))
 
 
 def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
-    """The cells of `config` whose results, bit for bit, are those in the dataset `there`; all but some to `rerun`."""
+    """Find the cells of `config` whose results, bit for bit, are in the dataset `there`, except those to `rerun`."""
     cells = _match(config.grid, _grid(there))
     status = there["status"].values.ravel()
     if rerun:
@@ -145,7 +145,7 @@ def _document(text: str) -> dict[str, Any]:
 
 
 def _settings(document: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """Everything that a configuration says, but for the values of `known` parameters, by which cells are matched."""
+    """Return everything in a configuration except the values of `known` parameters, by which cells are matched."""
     found = {key: value for key, value in document.items() if key not in (*sections(known), *known, "cases")}
     for section in (*sections(known), "integrator"):
         found |= {f"{section}.{key}": v for key, v in document.get(section, {}).items() if key not in known}
@@ -153,10 +153,10 @@ def _settings(document: Mapping[str, Any], known: Mapping[str, Parameter]) -> di
 
 
 def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Array, t_end: float) -> Array:
-    """Which of the cells of `grid`, with the indices `cells` in the earlier dataset, could end otherwise than before.
+    """Return which cells of `grid`, with the indices `cells` in the earlier dataset, could now end differently.
 
-    These are the cells that had not ended at the earlier limit `t_end`, or so late that the method had taken it into
-    account, and those that now take other steps.
+    These are cells that had not ended at the earlier limit `t_end`, cells that ended so late that the method had taken
+    the limit into account, and cells whose steps change.
     """
 
     def before(name: str) -> Array:
@@ -174,7 +174,7 @@ def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Arra
 
 
 def _grid(there: xr.Dataset) -> Grid:
-    """The grid of a dataset."""
+    """Return the grid of a dataset."""
     values = {str(name): coordinate.values for name, coordinate in there.coords.items()}
     constants = {name: float(value) for name, value in values.items() if value.ndim == 0}
     axes = {str(dim): values[str(dim)] for dim in there["status"].dims if dim not in ROWS}
@@ -184,7 +184,7 @@ def _grid(there: xr.Dataset) -> Grid:
 
 
 def _match(grid: Grid, there: Grid) -> Array:
-    """For each cell of `grid` its index in the grid `there`, or -1, shape (cells,)."""
+    """Return for each cell of `grid` its index in the grid `there`, or -1, shape (cells,)."""
     columns, old = grid.columns(), there.columns()
     if set(columns) != set(old):
         return np.full(grid.size, -1)
@@ -197,18 +197,18 @@ def _match(grid: Grid, there: Grid) -> Array:
 
 
 class Enlarged(Some):
-    """The cells that an earlier run lacks, and the dataset of these and of the earlier run's."""
+    """The cells that an earlier run lacks, and the dataset that combines these with the earlier run."""
 
     def __init__(self, config: Config, store: Store, earlier: Earlier) -> None:
         super().__init__(config, store)
         self.earlier = earlier
 
     def grow(self) -> bool:
-        """Add the tiles to simulate: all of them, once.  False if there are no more."""
+        """Add the tiles to simulate: all of them, once. Return False if there are no more."""
         return not self.tiles and self._add(np.flatnonzero(self.earlier.cells < 0))
 
     def dataset(self) -> xr.Dataset:
-        """The labelled dataset over all cells, in memory."""
+        """Return the labelled dataset over all cells, in memory."""
         arrays = dict[str, Array]()
         self._place(*self.earlier.taken(), arrays)
         self._place(self.cells, self._gather(), arrays)

@@ -1,20 +1,20 @@
-"""Finds the error of each cell, and runs cells again that are not within the tolerance.
+"""Estimates the error of each cell, and repeats cells that exceed the tolerance.
 
-Each cell is run a second time, in longer steps and to the time at which it ended.  The error of this *companion* is
-larger by a power of the ratio of the steps, so the difference of the two spins tells the error of the first run
-(Hairer, Nørsett and Wanner 1993, section II.4).  Whatever the motion does to an error, it does to this difference too:
-where it amplifies errors without bound, the difference is large, and no shorter step helps.  Where the companion counts
-other reversals than the run, so might another start or another computer.
+Each cell is run a second time, with longer steps and to the time at which it ended. The error of this *companion* is
+larger by a power of the ratio of the steps, so the difference of the two spins gives the error of the first run
+(Hairer, Nørsett and Wanner 1993, section II.4). Whatever the motion does to an error, it does to this difference too:
+if it amplifies errors without bound, the difference is large, and no shorter step helps. If the companion counts
+differently from the run, a slightly different start or another computer might do so too.
 
-Two runs can end at the same spin by chance, however wrong both are.  Then their rattles differ: where the spin whose
-energy is that of the difference of their states is large, the cell is repeated.  But the rattles agree too where the
-motion has amplified all errors along one direction.  So the error is told as at least a small share of what is to be
-expected: of the geometric mean of the tolerance, by which the step was chosen, and of what the energy balance tells.
-For `adams` that mean tells the error to a factor of seven, whatever the motion.
+Two runs can end at the same spin by chance, however wrong both are. Then their rattles differ: if the spin with the
+energy of the difference of their states is large, the cell is repeated. But the rattles agree too if the motion has
+amplified all errors along one direction. The reported error is therefore at least a small share of the expected one: of
+the geometric mean of the tolerance, from which the step was chosen, and of the estimate from the energy balance. For
+`adams` that mean gives the error to a factor of seven, whatever the motion.
 
-Of the other ways to an error, local estimates (the embedded formula, predictor less corrector) and the energy balance
-know nothing of what the motion does to an error; the balance misses it by a factor of 10 to 30.  A tangent costs twice
-the first run.  Figures: docs/explanation/accuracy.md.
+The other error estimates are worse: local ones (the embedded formula, predictor less corrector) and the energy balance
+know nothing of what the motion does to an error; the balance misses it by a factor of 10 to 30. A tangent costs twice
+the first run. Figures: docs/explanation/accuracy.md.
 """
 
 from __future__ import annotations
@@ -40,90 +40,89 @@ ROUNDS = 3
 """Largest number of repeats of a cell."""
 
 AIM = 0.5
-"""Share of the tolerance above which an error is made smaller: it is known within a factor of two for most cells."""
+"""Share of the tolerance to which an error is reduced: for most cells it is known within a factor of two."""
 
 SHORTEST = 8.0
-"""Largest factor by which a repeat has a shorter step.  An error that asks for more is taken as one that the motion
+"""Largest factor by which a repeat shortens the step. An error that needs more is treated as one that the motion
 amplifies without bound."""
 
 TOLERANCE_TIME = 400.0
-"""The time in sqrt(c/g) to which a tolerance refers; a longer run may have a larger error, in proportion."""
+"""The time in sqrt(c/g) to which a tolerance refers; the permitted error of a longer run grows in proportion."""
 
 ROUND_OFF = 1e-13
-"""An error in spin that no shorter step makes smaller, in sqrt(g/c)."""
+"""An error in spin that no shorter step reduces, in sqrt(g/c)."""
 
 AMPLIFIED = 1e3
-"""Ratio of an error to what the energy balance tells, beyond which no step that is shorter by more than `_MILD` is
-tried: the motion amplifies errors so much that it amplifies round-off too."""
+"""Ratio of an error to the estimate from the energy balance above which no step shorter by more than `_MILD` is tried:
+the motion amplifies errors so much that it amplifies round-off too."""
 
 APART = 0.1
-"""The same for the difference of the two spins relative to their size: they have nothing in common any more."""
+"""The same for the difference of the two spins relative to their size: above it they have nothing in common."""
 
 OF_RATTLE = 1 / 20
-"""Share of the error of the rattle beyond which spins are taken to agree by chance.  With a sixtieth, one of 300 wide
-cells was off by five times the tolerance unawares.  Where nothing else is to be expected, an error is told as at least
-that much."""
+"""Share of the error of the rattle above which spins are assumed to agree by chance. With a sixtieth, one of 300
+wide cells was off by five times the tolerance unnoticed. Where no other estimate applies, this is the least reported
+error."""
 
 DECIDED = 10.0
-"""How many times its estimated error the margin of a count has to be: of estimates, one in some hundred is more than
-ten times too small (docs/explanation/accuracy.md)."""
+"""Required ratio of the margin of a count to its estimated error: about one in a hundred estimates is more than ten
+times too small (docs/explanation/accuracy.md)."""
 
 _MILD = 2.0
 
-# A step that is shorter by some factor has to make the error smaller by at least this power of the factor.  Otherwise
-# there is no use in another step.
+# A step that is shorter by some factor has to reduce the error by at least this power of the factor. Otherwise a
+# further step is of no use.
 _LEAST_ORDER = 3
 
-# The order that is expected of both methods when a step is made shorter, and how close to the limit of stability a
-# longer one may come, from the share of the limit that automatic steps take.
+# The order assumed for both methods when a step is shortened, and how close to the limit of stability a longer one may
+# come, starting from the share of the limit used by automatic steps.
 _ORDER, _NEARER = 5, 1.1
 
-# Ratio of steps below which two runs are too much alike to tell an error.
+# Ratio of steps below which two runs are too similar to give an error.
 _ALIKE = 1.02
 
 
 class Errors(NamedTuple):
-    """What the companions of a run's cells tell, each of shape (cells,)."""
+    """Results of comparing cells with their companions, each of shape (cells,)."""
 
     spin: Array
-    """Error of the spin at the end by the spin of the companion, infinite if that failed; for a run that failed, by the
+    """Error of the final spin from the spin of the companion, infinite if that failed; for a run that failed, from the
     repeat that met the same failure, or NaN."""
     rattle: Array
-    """Error of the rattle, as that of the spin with its energy; NaN where there is no companion."""
+    """Error of the rattle, as the spin with its energy; NaN without a companion."""
     least: Array
-    """What the error of the spin is told to be at least; NaN where there is no companion."""
+    """Lower bound on the reported error of the spin; NaN without a companion."""
     reversals: Array
-    """The companions' counts; NaN where there is none."""
+    """Counts of the companions; NaN where there is none."""
     apart: Array
     """Difference of the spins relative to the spins themselves."""
     overshoot: Array
-    """Estimated error of the margin to one reversal fewer; NaN where it is not measured, or there is no companion."""
+    """Estimated error of the margin to one reversal fewer; NaN if it is not measured, or without a companion."""
     nearest_approach: Array
-    """The same to one more."""
+    """Estimated error of the margin to one reversal more."""
 
     @property
-    def told(self) -> Array:
-        """Estimated error of the spin at the end, shape (cells,)."""
+    def reported(self) -> Array:
+        """Return the estimated error of the final spin, shape (cells,)."""
         return np.asarray(np.fmax(self.spin, self.least))
 
 
 def accompany(lives: Lives, rows: Array) -> None:
-    """Let the companions of the cells `rows` run, whose own runs are put aside."""
+    """Start the companions of the cells `rows`, setting their own runs aside."""
     run = lives.take(rows)
     lives.aside[rows] = run.images
     lives.enter(rows, COMPANION, companions(run))
 
 
 def after_companion(lives: Lives, rows: Array) -> Array:
-    """Find the errors of the cells `rows`, whose companions have ended; those above the tolerance run again.
+    """Estimate the errors of the cells `rows`, whose companions have ended; those above the tolerance run again.
 
-    A step that the configuration fixes stays, and so does that of a search.  Otherwise it is made shorter, `ROUNDS`
-    times at most, until the error is below `AIM` times what the tolerance allows.  A cell whose error stays above the
-    tolerance is `MISSED`.
+    A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, at most `ROUNDS` times,
+    until the error is below `AIM` times the tolerance.  A cell whose error stays above the tolerance is `MISSED`.
 
     Returns
     -------
-    The indices of the cells that do not run again.
+    The indices of the cells that are not repeated.
     """
     notes, rules, method = lives.notes, lives.cells.rules, METHODS[lives.cells.method]
     now, other = lives.cells.take(rows, lives.aside[rows]), lives.take(rows)
@@ -137,7 +136,7 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
     again = (large | by_chance) & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
     if not rules.fixed:
-        missed = rows[~again & (errors.told > limit)]
+        missed = rows[~again & (errors.reported > limit)]
         notes["step_rule"][missed] = MISSED
     lives.cells.images[rows] = now.images
     lives.note(rows, ERRORS, stack(errors).T)
@@ -152,16 +151,16 @@ def after_companion(lives: Lives, rows: Array) -> Array:
 
 
 def allowed(part: Cells) -> Array:
-    """Error in spin that the tolerance allows at the ends of the runs, in the model's units, shape (cells,)."""
+    """Return the permitted error in spin at the ends of the runs, in the model's units, shape (cells,)."""
     unit = part.model.spin_unit(part.columns)
     longer = np.maximum(part.times * unit / TOLERANCE_TIME, 1)
     return np.asarray(max(part.rules.tolerance, ROUND_OFF) * longer * unit)
 
 
 def imbalance(part: Cells) -> Array:
-    """Error of the energy balance as one in spin, at the fastest spin that the energy allows, shape (cells,).
+    """Return the energy balance's error as one in spin, at the fastest spin that the energy allows, shape (cells,).
 
-    Infinite if the run does not measure it.
+    It is infinite if the run does not measure it.
     """
     if "energy_error" not in part.kernel.measure:
         return np.full(len(part.cells), np.inf)
@@ -171,12 +170,12 @@ def imbalance(part: Cells) -> Array:
 
 
 def companions(part: Cells) -> Array:
-    """Images of the companions of cells, none of which has failed, at t = 0."""
+    """Return state rows at t = 0 of the companions of cells, none of which has failed."""
     return part.start(part.kernel.table(part.images)["step"] * _ratio(part), part.times)
 
 
-def told(lives: Lives) -> Errors:
-    """The errors of all cells, as far as known."""
+def errors_of(lives: Lives) -> Errors:
+    """Return the errors of all cells, as far as known."""
     table = lives.cells.kernel.table(lives.cells.images)
     errors = Errors(*lives.notes.columns(ERRORS).T)
     spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
@@ -184,11 +183,11 @@ def told(lives: Lives) -> Errors:
 
 
 def compare(part: Cells, companion: Cells) -> Errors:
-    """Compare the cells of `part` with their companions, when all have ended."""
+    """Compare the cells of `part` with their companions, once all have ended."""
     kernel, both = part.kernel, (part.images, companion.images)
     table, other = map(kernel.table, both)
     (states, constants), (others, _) = map(kernel.unpack, both)
-    with np.errstate(invalid="ignore", over="ignore"):  # the states of a companion that failed
+    with np.errstate(invalid="ignore", over="ignore"):  # the companion may have failed
         spins = [kernel.model.energy(each, constants)[0] for each in (states, others)]
         _, energy, inertia = kernel.model.energy(states - others, constants)
         rattle = np.sqrt(2 * np.abs(energy) / inertia)
@@ -198,9 +197,7 @@ def compare(part: Cells, companion: Cells) -> Errors:
     difference, size = np.abs(spins[0] - spins[1]), np.abs(spins[0]) + np.abs(spins[1])
     apart = np.divide(difference, size, out=np.zeros_like(size), where=~failed & (size > 0))
     counts = other["reversals"] if "reversals" in kernel.measure else np.nan
-    margins = np.full((len(EXTREMES), len(failed)), np.nan)
-    if "margin" in kernel.measure:
-        margins = np.stack([np.abs(table[name] - other[name]) for name in EXTREMES]) / larger
+    margins = np.stack([np.abs(part.recorded(name) - companion.recorded(name)) for name in EXTREMES]) / larger
     margins[:, failed] = np.nan
     spin = np.where(failed, np.inf, difference / larger)
     rattle = np.where(failed, np.nan, rattle / larger)
@@ -208,7 +205,7 @@ def compare(part: Cells, companion: Cells) -> Errors:
 
 
 def _least(part: Cells, rattle: Array) -> Array:
-    """What the errors of the cells of `part` are at least, shape (cells,), if that of the rattle is `rattle`."""
+    """Return lower bounds on the errors of the cells of `part`, shape (cells,), given the error of the rattle."""
     share, balance = METHODS[part.method].least_error, imbalance(part)
     known = np.isfinite(balance + rattle) & (share > 0) & (not part.rules.fixed)
     expected = np.sqrt(np.where(known, balance, 0.0) * allowed(part))
@@ -216,7 +213,7 @@ def _least(part: Cells, rattle: Array) -> Array:
 
 
 def _ratio(part: Cells) -> Array:
-    """Ratio of the companions' steps to those of the cells, shape (cells,), within what is stable."""
+    """Return the ratio of the companions' steps to the cells' steps, shape (cells,), within the stability limit."""
     method, ratio = METHODS[part.method], np.full(len(part.cells), METHODS[part.method].companion)
     if method.stable_step is None:
         return ratio
@@ -226,32 +223,32 @@ def _ratio(part: Cells) -> Array:
 
 
 def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
-    """Collect what was simulated and, where cells were run twice, how exact it is: by name, over all cells of `job`."""
+    """Collect the simulated variables of `job` by name, over all cells, with accuracies where cells were run twice."""
     found = job.results()
     if not any(part.rules.twice for part in job.parts):
         return found
     errors = Errors(*np.full((len(Errors._fields), len(found["status"])), np.nan))
     for each in lives:
-        for whole, part in zip(errors, told(each), strict=True):
+        for whole, part in zip(errors, errors_of(each), strict=True):
             whole[each.cells.cells] = part
-    found["spin_error"] = errors.told
+    found["spin_error"] = errors.reported
     if "reversals" in found:
         sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
-        found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a companion that fails counts NaN
+        found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a failed companion has the count NaN
     if "margin_more" in found:
         found["decided"] = _decided(found, errors) & _consistent(job, found)
     return found
 
 
 def _decided(found: Mapping[str, Array], errors: Errors) -> Array:
-    """Find the counts that are final and certain, shape (cells,)."""
+    """Return which counts are final and certain, shape (cells,)."""
     firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
     below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * errors.overshoot)
     return np.asarray(firm & below & (found["margin_more"] > DECIDED * errors.nearest_approach))
 
 
 def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:
-    """Tell where the parity of the count is that of the signs of the spin at the start and the end, shape (cells,)."""
+    """Return where the parity of the count matches the signs of the spin at start and end, shape (cells,)."""
     consistent = np.zeros(len(found["reversals"]), bool)
     for part in job.parts:
         model = part.model

@@ -1,4 +1,4 @@
-"""Estimates what a run would take, from a sample of its cells, before anything is computed."""
+"""Estimates the cost of a run from a sample of its cells, before anything is computed."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from sweep.models import MODELS
 from sweep.models.user.blame import blamed
 
 _SAMPLE = 4096
-"""Cells whose steps are chosen to judge all the others by."""
+"""Number of cells whose steps are chosen, as a sample of all cells."""
 
 _BYTES_A_CELL = 130
-"""What the results of a cell take on disk."""
+"""Bytes on disk for the results of a cell."""
 
 _AROUND = 2.6
-"""Time in s to import what a run needs, to write its dataset and to draw its maps."""
+"""Time in s to import the libraries, to write the dataset and to draw the maps."""
 
 _GENERAL = 1.4
-"""Time of a step of a model that is not the paper's, relative to one that is (docs/reference/performance.md)."""
+"""Cost of a step of a model other than the paper's, relative to the paper's (docs/reference/performance.md)."""
 
 
 def estimate(config: Config) -> str:
-    """Cells, steps, memory and time of a run, a line each."""
+    """Describe cells, steps, memory and time of a run, a line each."""
     grid = config.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True))
     cells = f"cells:  {grid.size}{f' ({axes})' if axes else ''}" + (
@@ -65,7 +65,7 @@ def estimate(config: Config) -> str:
 
 
 def _works(config: Config, chosen: tuple[Cells, ...], steps: list[Array], share: float) -> Iterator[Array]:
-    """The work for each cell, in steps of dopri5 alone: for each method."""
+    """Return the work for each cell, in steps of dopri5 alone: for each method."""
     if not chosen:
         return  # no body of the sample is possible
     relative = 1.0 if config.equations.name in MODELS else _GENERAL

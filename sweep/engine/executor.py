@@ -16,19 +16,19 @@ from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.status import RUNNING
 
 CHUNK_SECONDS = 0.7
-"""Length of a chunk.  Progress, checkpoints and Ctrl-C wait for the end of one."""
+"""Length of a chunk in s. Progress, checkpoints and Ctrl-C wait for the end of a chunk."""
 
 _SHORT = 0.05
-"""The same where lanes have become idle, in s: cells that have ended may go on."""
+"""Length of a chunk in s once lanes are idle: cells that have ended may continue."""
 
-# Cells that have ended go on together, so many at a time, unless there are fewer than this many others for each lane.
+# Cells that have ended continue in batches of this many, unless fewer than this many other cells remain for each lane.
 _TOGETHER, _ENOUGH = 64, 2
 
 STEP_SECONDS = 25e-9
 """Rough time of a step of one lane on one thread, measured on the slip model with dopri5 (`sweep bench`)."""
 
 UNTIL_ALL_STOP = 2**40
-"""Blocks of steps: as many as are needed."""
+"""Number of blocks of steps without a limit."""
 
 
 def keep_busy(
@@ -36,12 +36,12 @@ def keep_busy(
 ) -> None:
     """Run the cells of `lives` through all their stages.
 
-    The lanes take whatever waits, first the cells whose stages have most steps left.  Neither the order nor the size of
-    the chunks changes a result.
+    Lanes take waiting cells, those with most steps left in their stage first. Neither the order nor the size of the
+    chunks changes a result.
 
     Parameters
     ----------
-    proceed : called with cells whose stages have ended, to let them enter others
+    proceed : called with cells whose stages have ended, to start their next stages
     after_chunk : called after each chunk, when all is consistent: to report, save, or stop by raising an exception
     """
     blocks = [1] * len(lives)
@@ -62,7 +62,7 @@ def keep_busy(
 
 
 def _advance(lives: Lives, rows: Array, blocks: int) -> int:
-    """Advance the cells `rows` by so many blocks in every lane; return how many the next chunk should have."""
+    """Advance the cells `rows` by this many blocks in every lane; return how many blocks the next chunk should have."""
     kernel, images = lives.cells.kernel, lives.cells.images
     table, began = kernel.table(images), time.perf_counter()
     left = table["goal"][rows] - table["done"][rows]
@@ -83,7 +83,7 @@ def execute(
 
     Parameters
     ----------
-    images : shape (cells, rows), a row of the table per trajectory
+    images : state rows, shape (cells, rows)
     after_chunk : called after each chunk, when `images` is consistent: to report, or stop by raising an exception
     chunk_blocks : blocks of steps per chunk; by default as many as take about `CHUNK_SECONDS`
     """
@@ -100,12 +100,12 @@ def execute(
 
 
 def _rescale(blocks: int, seconds: float) -> int:
-    # While the last trajectories pause often, every call is short, and `blocks` would grow without end.
+    # When the last trajectories pause often, every call is short, and `blocks` would grow without bound.
     return min(max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8))), UNTIL_ALL_STOP)
 
 
 def nominal_seconds(steps: Array) -> float:
-    """Rough upper bound on the time for trajectories of so many `steps`, shape (cells,)."""
+    """Return a rough upper bound on the time for trajectories of `steps`, shape (cells,)."""
     lanes = max(threads() * LANES, len(steps))
     blocks = np.ceil(steps / BLOCK)
     return float(max(blocks.mean() * lanes / threads(), blocks.max() * LANES) * BLOCK * STEP_SECONDS)

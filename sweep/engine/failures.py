@@ -1,9 +1,9 @@
-"""Looks again at cells whose run failed, with a shorter step, and finds out what is true.
+"""Repeats cells whose run failed with shorter steps, to find out what really happens.
 
-A failure is a statement about physics, so one run does not settle it: with too long a step a body seems to lift off, to
-jam or to topple that does nothing of the kind.  Two runs have to agree, the second with half the step of the first.
-Each is stopped a few steps ahead of its failure and followed from there (`sweep.kernels.failure`); the failure is true
-if both meet the same one at the same time.
+A failure is a statement about physics, so one run does not settle it: too long a step can produce a spurious lift-off,
+jam or topple. Two runs have to agree, the second with half the step of the first. Each is stopped a few steps ahead of
+its failure and followed from there (`sweep.kernels.failure`); the failure is genuine if both meet the same one at the
+same time.
 
 Each cell is judged by its own results alone, so nothing depends on which cells were repeated with it.
 """
@@ -30,53 +30,53 @@ from sweep.kernels.status import DIVERGED, FAILURES, RUNNING
 from sweep.models.model import stack, take
 
 ROUNDS, FALSE_ROUNDS = 3, 8
-"""Largest number of repeats, each with half the step of the one before; and the same where every run so far has failed
-falsely, because then its numbers are worth nothing."""
+"""Largest number of repeats, each with half the step of the one before; and the same if every run so far has failed
+spuriously, which makes its numbers worthless."""
 
 MOST_STEPS = 1e8
-"""Steps beyond which a repeat is not tried: a minute for one cell, or for all that fill the lanes beside it.  If only
+"""Steps above which a repeat is not tried: a minute for one cell, or for all that fill the lanes next to it. If only
 the way to a failure is shorter, that alone is repeated."""
 
 SAME = 1e-6
-"""Largest difference of the times at which two runs meet the same failure, in sqrt(c/g)."""
+"""Largest time difference at which two runs meet the same failure, in sqrt(c/g)."""
 
 UNSOUND = 0.01
-"""Relative error of the energy balance beyond which a run is never called sound."""
+"""Relative error of the energy balance above which a run is never considered sound."""
 
-# How many steps ahead of a failure, and how many beyond it, a run is followed in short steps.  The longest history of a
-# method has eight points: so far back no point comes from the failure.
+# Number of steps ahead of a failure, and beyond it, in which a run is followed with short steps. The longest history of
+# a method has eight points, so none of them comes from the failure.
 _AHEAD, _BEYOND = 8, 2
 
-# Cells that are followed between two calls of `after_chunk`: half a second at most friction.
+# Number of cells followed between two calls of `after_chunk`: half a second at most friction.
 _AT_A_TIME = 64
 
 
 class Met(NamedTuple):
-    """Holds what runs that failed have met, as the approach in short steps tells it."""
+    """The failures that runs met, according to the approach with short steps."""
 
     kind: Array
     """`LIFT_OFF`, `PARADOX`, `TOPPLED`, or `DIVERGED` where no step is short enough; `RUNNING` where a run has met
     nothing, shape (cells,)."""
     time: Array
-    """When, in sqrt(c/g), shape (cells,)."""
+    """Time of the failure, in sqrt(c/g), shape (cells,)."""
     spin: Array
-    """The spin at that time, shape (cells,)."""
+    """Spin at that time, shape (cells,)."""
     doubt: Array
-    """How much the spin may change in what the approach leaves of that time, shape (cells,)."""
+    """Largest change of the spin within the uncertainty of that time, shape (cells,)."""
 
     @classmethod
     def nothing(cls, cells: int) -> Met:
-        """What so many runs have met that did not fail."""
+        """Return the record of runs that did not fail."""
         return cls(np.full(cells, RUNNING), *np.zeros((3, cells)))
 
     def agrees(self, other: Met, within: float | Array) -> Array:
-        """Tell where both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
+        """Return where both have met the same failure, at times that differ by at most `within`, shape (cells,)."""
         near = np.abs(self.time - other.time) <= within
         return np.asarray((self.kind != RUNNING) & (self.kind == other.kind) & near)
 
 
 def unsound(cells: Cells) -> Array:
-    """Tell where the energy balance is so wrong that no number of the run can be right, shape (cells,)."""
+    """Return where the energy balance is so wrong that no number of the run can be right, shape (cells,)."""
     if "energy_error" not in cells.kernel.measure:
         return np.zeros(len(cells.cells), bool)
     table = cells.kernel.table(cells.images)
@@ -84,16 +84,16 @@ def unsound(cells: Cells) -> Array:
 
 
 def look_at(lives: Lives, rows: Array) -> Array:
-    """Look at the runs of the cells `rows`, which are over: at those that failed again, until it is known what is true.
+    """Examine the finished runs of the cells `rows`; repeat those that failed until the outcome is certain.
 
-    A failure gets its true status, its time and the spin at that time.  Where two runs do not meet the same one, the
-    step is halved again, at most `ROUNDS` times, until a run ends soundly.  That run takes the place of the first.  A
-    run that still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy
-    balance is off by more than `UNSOUND`.
+    A genuine failure gets its status, its time and the spin at that time. If two runs do not meet the same failure, the
+    step is halved again, at most `ROUNDS` times, until a run ends soundly. That run replaces the first.  A run that
+    still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy balance is off
+    by more than `UNSOUND`.
 
     Returns
     -------
-    The indices of the cells of which this is known now; the others go on.
+    The indices of the cells whose outcome is now known; the others continue.
     """
     cells, begun = lives.take(rows), lives.notes["halvings"][rows] > 0
     failed = cells.failed
@@ -106,11 +106,11 @@ def look_at(lives: Lives, rows: Array) -> Array:
 
 
 def _approach(lives: Lives, rows: Array) -> Array:
-    """Let failed cells run again to a few steps ahead of their failures.
+    """Rerun failed cells to a few steps ahead of their failures.
 
     Returns
     -------
-    The indices of those that fail so early that there is nothing to run again.
+    The indices of cells that fail so early that there is nothing to rerun.
     """
     cells = lives.take(rows)
     goal = cells.kernel.table(cells.images)["done"] - _AHEAD
@@ -121,7 +121,7 @@ def _approach(lives: Lives, rows: Array) -> Array:
 
 
 def after_approach(lives: Lives, rows: Array) -> Array:
-    """Follow cells from where they are ahead of a failure, and conclude; result as of `look_at`."""
+    """Follow cells from a few steps ahead of a failure, and conclude; returns as `look_at`."""
     if not len(rows):
         return rows
     met, cells = Met.nothing(len(rows)), lives.cells.take(rows, lives.aside[rows])
@@ -143,7 +143,7 @@ def after_approach(lives: Lives, rows: Array) -> Array:
 
 
 def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
-    """Decide what is true of the cells `rows`, whose runs have `met` something; result as of `look_at`."""
+    """Decide the outcome of the cells `rows`, whose runs have `met` something; returns as `look_at`."""
     notes, now = lives.notes, lives.take(rows)
     table, rules = now.kernel.table(now.images), now.rules
     halvings, before = notes["halvings"][rows], Met(*notes.columns(MET)[rows].T)
@@ -157,7 +157,7 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
     true = met.agrees(before, within)
     doubtful = ~true & (now.failed | unsound(now))
     over = ~doubtful | last
-    # With a fixed step the run in half the step only confirms; a brief run that did not fail is no result.
+    # With a fixed step, the run with half the step only confirms; a brief run that did not fail gives no result.
     back = over & ((halvings > 0) if rules.fixed else (notes["brief"][rows] > 0) & ~true)
     here = rows[over]
     step, images = now.step[over], now.images[over]
@@ -172,17 +172,17 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
 
 
 def deny_unsound(lives: Lives, rows: Array) -> None:
-    """Let those of the cells `rows` diverge whose energy balance is wrong, although they did not fail."""
+    """Mark cells of `rows` as diverged if their energy balance is wrong, although they did not fail."""
     cells = lives.take(rows)
     wrong = rows[unsound(cells) & ~cells.failed]
     lives.cells.kernel.table(lives.cells.images)["status"][wrong] = DIVERGED
 
 
 def _set_true(lives: Lives, rows: Array, images: Array, met: Met, before: Met, true: Array) -> None:
-    """Let `images` stand for the cells `rows`, with statuses that are true.
+    """Set `images`, with final statuses, as the state rows of the cells `rows`.
 
-    A failure that is not `true` is one of the integration.  `before` is what the runs in steps of twice the length have
-    met.
+    A failure that is not `true` is an artefact of the integration. `before` holds what the runs with steps of twice the
+    length have met.
     """
     table, method = lives.cells.kernel.table(images), METHODS[lives.cells.method]
     error = np.maximum(np.abs(met.spin - before.spin) / (2**method.error_order - 1), met.doubt)
@@ -194,7 +194,7 @@ def _set_true(lives: Lives, rows: Array, images: Array, met: Met, before: Met, t
 
 
 def _halve(lives: Lives, rows: Array, met: Met, brief: Array) -> None:
-    """Run the cells `rows` again in half the step; where `brief`, to where the run before failed, and no further."""
+    """Rerun the cells `rows` with half the step; where `brief`, only up to the failure of the run before."""
     notes, now = lives.notes, lives.take(rows)
     # A run may be stopped before the failure that lies ahead of it.
     steps = np.maximum(now.times, met.time) / now.kernel.table(now.images)["step"]

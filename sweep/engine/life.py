@@ -1,8 +1,8 @@
-"""The life of a cell, from its start to a result that can be believed.
+"""Takes a cell from its start to a result that can be trusted.
 
-    run → is it over → did it fail truly → companion → is it within its tolerance → again in shorter steps, or done
+run → is it over → is its failure genuine → companion → is it within its tolerance → repeat with shorter steps, or done
 
-Each stage decides for all cells at once that have come to its end, and each cell by its own results alone.
+Each stage decides for all cells at once that have reached its end, and each cell by its own results alone.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sweep.kernels.methods import METHODS
 
 
 def begin(parts: Sequence[Cells]) -> list[Lives]:
-    """Begin the lives of cells whose images are at t = 0."""
+    """Set up the lives of cells whose state rows are at t = 0."""
     lives = [Lives(part) for part in parts]
     for each in lives:
         every = np.arange(len(each.cells.cells))
@@ -29,12 +29,12 @@ def begin(parts: Sequence[Cells]) -> list[Lives]:
 
 
 def live(lives: Sequence[Lives], after_chunk: Callable[[], None] = lambda: None) -> None:
-    """Let all cells live to their ends; `after_chunk` as of `keep_busy`."""
+    """Take all cells through their lives; `after_chunk` as for `keep_busy`."""
     keep_busy(lives, proceed, after_chunk)
 
 
 def proceed(lives: Lives, rows: Array) -> None:
-    """Let the cells `rows`, whose stages have ended, enter the next."""
+    """Move the cells `rows`, whose stages have ended, to their next stages."""
     stage = lives.stage[rows]
     over = ending.over(lives, rows[stage == RUN])
     known = [failures.look_at(lives, over), failures.after_approach(lives, rows[stage == APPROACH])]
@@ -51,9 +51,9 @@ def proceed(lives: Lives, rows: Array) -> None:
 
 
 def progress(lives: Sequence[Lives]) -> tuple[float, int]:
-    """The share of the work that is done, as a number of cells, and how many cells have failed.
+    """Return the completed share of the work, as a number of cells, and the number of failed cells.
 
-    How long a run will be that has not ended is guessed from those that have.
+    The length of a run that has not ended is guessed from those that have.
     """
     cells = failed = 0
     done, left = 0.0, 0.0

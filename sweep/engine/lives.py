@@ -1,7 +1,7 @@
-"""Keeps what the cells of a batch go through: one table of images for each method, each image with its stage.
+"""Tracks the cells of a batch: one table of state rows for each method, each row with its stage.
 
-A cell has one image that runs, or waits for a lane.  Beside it stand the image of the run before it, while a failure is
-looked at again, and an image that is put aside, while another stands in its place.
+A cell has one state row that runs, or waits for a lane. In addition it may have the row of the run before, while a
+failure is being examined, and a row that is set aside while another one runs in its place.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from sweep.kernels.layout import Layout, Table
 from sweep.kernels.status import QUIET, RUNNING
 
 RUN, APPROACH, COMPANION, DONE = range(4)
-"""Stages of a cell: it runs to its end; it runs to a few steps ahead of a failure, which is put aside; its companion
-runs, and the run is put aside; all is known of it."""
+"""Stages of a cell: it runs to its end; it runs to a few steps ahead of a failure, which is set aside; its companion
+runs, and the run is set aside; everything is known."""
 
 MET = ("met.kind", "met.time", "met.spin", "met.doubt")
 """What the last run met (`sweep.engine.failures.Met`)."""
@@ -27,7 +27,7 @@ ERRORS = (
     "error.spin", "error.rattle", "error.least", "error.reversals", "error.apart", "error.overshoot",
     "error.nearest_approach",
 )  # fmt: skip
-"""What the last companion told (`sweep.engine.errors.Errors`)."""
+"""What the last companion showed (`sweep.engine.errors.Errors`)."""
 
 NOTES = Layout(
     (
@@ -35,19 +35,19 @@ NOTES = Layout(
         "repeats", "most_error", *ERRORS,
     )
 )  # fmt: skip
-"""What is noted of each cell.  `leg`, `wary` and `most` are of `sweep.engine.ending`; `halvings`, `brief`,
-`step_before` and what was met are of `sweep.engine.failures`; the others are of `sweep.engine.errors`."""
+"""The notes on each cell. `leg`, `wary` and `most` belong to `sweep.engine.ending`; `halvings`, `brief`, `step_before`
+and what was met belong to `sweep.engine.failures`; the others belong to `sweep.engine.errors`."""
 
 
 class Lives:
-    """The cells of one method, and how far each has come.
+    """The cells of one method, and the progress of each.
 
     Attributes
     ----------
-    cells : their images are those that run
-    notes : what is noted of each cell, a `Table` with the layout `NOTES`
-    before : images of the runs before those that run, shape (cells, rows)
-    aside : images that others stand in for, shape (cells, rows)
+    cells : with the state rows that run
+    notes : a `Table` with the layout `NOTES`
+    before : state rows of the previous runs, shape (cells, rows)
+    aside : state rows that are set aside, shape (cells, rows)
     """
 
     def __init__(self, cells: Cells) -> None:
@@ -65,48 +65,48 @@ class Lives:
 
     @property
     def running(self) -> Array:
-        """Indices of the cells that wait for steps."""
+        """Return the indices of cells that wait for steps."""
         return np.flatnonzero((self.stage != DONE) & (self.cells.status == RUNNING))
 
     @property
     def quiet(self) -> Array:
-        """Indices of the cells that wait to be carried on without steps."""
+        """Return the indices of cells that wait to continue without steps."""
         return np.flatnonzero((self.stage != DONE) & (self.cells.status == QUIET))
 
     @property
     def ended(self) -> Array:
-        """Indices of the cells whose stage has ended."""
+        """Return the indices of cells whose stage has ended."""
         return np.flatnonzero((self.stage != DONE) & ~np.isin(self.cells.status, (RUNNING, QUIET)))
 
     def table(self, rows: Array) -> Table:
-        """A copy of some images, to be written back."""
+        """Return a copy of some state rows, to be written back."""
         return self.cells.kernel.table(self.cells.images[rows])
 
     def take(self, rows: Array) -> Cells:
-        """Some cells, with a copy of their images."""
+        """Return some cells, with a copy of their state rows."""
         return self.cells.take(rows)
 
     def note(self, rows: Array, names: Sequence[str], values: Array | float) -> None:
-        """Note `values`, of shape (rows, names) or the same for all, of the cells `rows`."""
+        """Note `values`, of shape (rows, names) or the same for all, for the cells `rows`."""
         self.notes.images[rows[:, None], np.array([NOTES.index(name) for name in names])] = values
 
     def enter(
         self, rows: Array, stage: int, images: Array, *, settles: bool = False, goal: Array | float = np.inf
     ) -> None:
-        """Let `images` stand for the cells `rows`, in a stage: they run to their ends, or for `goal` steps."""
+        """Set the state rows of the cells `rows` in a stage: they run to their ends, or for `goal` steps."""
         table = self.cells.kernel.table(images)
         table["settles"], table["goal"] = settles, np.minimum(table["steps"], goal)
         self.cells.images[rows], self.notes["stage"][rows] = images, stage
 
     def saved(self) -> dict[str, Array]:
-        """All that an interrupted batch needs to go on, by name."""
+        """Return everything that an interrupted batch needs to resume, by name."""
         tables = {"images": self.cells.images, "notes": self.notes.images}
         tables |= {"before": self.before} if self.notes["halvings"].any() else {}
         tables |= {"aside": self.aside} if np.isin(self.stage, (APPROACH, COMPANION)).any() else {}
         return {f"{self.cells.method} {name}": table for name, table in tables.items()}
 
     def resume(self, saved: dict[str, Array]) -> None:
-        """Go on from what `saved` gave, if it is of these cells."""
+        """Resume from what `saved` returned, if it is of these cells."""
         own = {"images": self.cells.images, "notes": self.notes.images, "before": self.before, "aside": self.aside}
         found = {name: saved[key] for name in own if (key := f"{self.cells.method} {name}") in saved}
         if all(name in found and found[name].shape == own[name].shape for name in ("images", "notes")):

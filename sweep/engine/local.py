@@ -21,10 +21,10 @@ from sweep.results.provenance import this_cpu
 from sweep.results.store import Running, Store
 
 BATCH = 32_768
-"""Cells simulated together (50 MB of images).  Lanes idle only at the end of such a batch of tiles."""
+"""Cells simulated together (50 MB of state rows). Lanes idle only at the end of each batch of tiles."""
 
 Done = tuple[int, dict[str, Array]]
-"""The number of a finished tile, and by name its results, each of shape (cells,), its cost and the type of CPU."""
+"""The number of a finished tile, its results by name, each of shape (cells,), its cost and the type of CPU."""
 
 
 def run_batch(
@@ -40,10 +40,10 @@ def run_batch(
 
     Parameters
     ----------
-    store : keeps the images after each chunk
-    left : the images of this batch that an earlier run left, to be continued
-    after_chunk : called with the number of the batch's cells that are done, a fraction where a cell is run more than
-        once, and how many of them have failed
+    store : saves the state rows after each chunk
+    left : the state rows of this batch that an earlier run left, to be resumed
+    after_chunk : called with the number of finished cells of the batch, fractional where a cell is run more than once,
+        and the number of failed ones
     """
     grid, cpu = config.grid, np.array(this_cpu())
     if not config.simulated:
@@ -60,7 +60,7 @@ def run_batch(
         each.resume(left.tables if left else {})
 
     def report() -> None:
-        # Images are saved only between two chunks: anywhere else an interrupt may find half of them advanced.
+        # Save state rows only between two chunks: anywhere else an interrupt may find half of them advanced.
         if store:
             tables = {name: table for each in lives for name, table in each.saved().items()}
             store.save_running(Running(list(batch), tables, time.perf_counter() - began))
@@ -77,19 +77,24 @@ def run_batch(
 def batches(
     grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], store: Store
 ) -> Iterator[tuple[list[int], Running | None]]:
-    """The tiles to run together, out of `todo`: first those whose images `store` has, along with these."""
+    """Return the tiles to run together, out of `todo`: first those whose state rows `store` has."""
     left = store.load_running()
     if left and set(left.tiles) <= set(todo):
         yield left.tiles, left
         todo = [i for i in todo if i not in left.tiles]
+    for batch in split(grid, tiles, todo, BATCH, len(todo)):
+        yield batch, None
+
+
+def split(grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], cells: int, most: int) -> Iterator[list[int]]:
+    """Split `todo` into batches of about `cells` cells, but at least one tile and at most `most` tiles."""
     largest = max((grid.part(tiles[i]).size for i in todo), default=1)
-    together = max(1, BATCH // largest)
-    for first in range(0, len(todo), together):
-        yield list(todo[first : first + together]), None
+    length = max(1, min(cells // largest, most))
+    return (list(todo[first : first + length]) for first in range(0, len(todo), length))
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
-    """The results of a model that is a formula."""
+    """Return the results of a model that is a formula."""
     arrays = predict(config.tier, grid).variables
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:

@@ -1,7 +1,7 @@
 """Computes the misfit of every cell of a run to a film, from samples of its spin.
 
-A run may end before the film does, and its steps lead past the film's instants.  So each cell is followed once more, in
-steps of dopri5 that end at the instants.
+A run may end before the film does, and its steps do not stop at the film's instants. Each cell is therefore followed
+once more, with steps of dopri5 that end at the instants.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
 
-# Steps between two checks for Ctrl-C: some tenths of a second.
+# Steps between two checks for Ctrl-C, which take a few tenths of a second.
 _STEPS = 2e7
 
 
 def misfits(job: Plan) -> dict[str, Array]:
-    """Compute the misfit over all cells of `job`, whose runs have ended, if it is measured; NaN where a run failed."""
+    """Compute the misfit of all cells of `job`, whose runs have ended, if it is measured; NaN where a run failed."""
     film = job.config.film
     if film is None:
         return {}
@@ -37,10 +37,10 @@ def misfits(job: Plan) -> dict[str, Array]:
 
 
 def _of_part(config: Config, part: Cells, rows: Array, film: Film) -> Array:
-    """Misfits of the cells of `part` with the indices `rows`, in the same order."""
+    """Return the misfits of the cells of `part` with the indices `rows`, in the same order."""
     model, columns = part.model, part.columns
     usual, _ = steps_of(part.method, config, columns)
-    # A cell that was repeated in shorter steps needs them here too.
+    # Cells that were repeated with shorter steps need them here too.
     step = automatic_step(PLAIN, model, columns)[0] * np.minimum(part.step / usual, 1.0)
     steps = len(film.time) + film.time[-1] / step[rows]
     pieces = np.array_split(rows, max(1, min(len(rows) // (LANES * threads()), int(steps.sum() / _STEPS))))

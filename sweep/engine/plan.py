@@ -1,4 +1,4 @@
-"""Gives each cell of grids its method, step, limits and start, before any step is taken."""
+"""Prepares each cell: method, step, limits and initial state."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ _kernel = cache(methods.make_kernel)
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything that a simulation needs, before the first step is taken."""
+    """Everything that a simulation needs before the first step."""
 
     config: Config
     grids: tuple[Grid, ...]
-    """The cells are those of the first grid, followed by those of the next, and so on."""
+    """The grids; their cells are numbered consecutively."""
     predictions: tuple[Prediction, ...]
     parts: tuple[Cells, ...]
-    """One part, unless the configuration has the method chosen for each cell (`method: auto`).  Cells of impossible
+    """One part, unless the configuration lets the method be chosen for each cell (`method: auto`). Cells of impossible
     bodies are in none."""
 
     def results(self) -> dict[str, Array]:
-        """Collect what was simulated, by name, each over all cells, once all trajectories have ended."""
+        """Collect the simulated variables by name, each over all cells, once all trajectories have ended."""
         size = sum(grid.size for grid in self.grids)
         arrays: dict[str, Array] = {}
         for part in self.parts:
@@ -56,7 +56,7 @@ class Plan:
         return arrays
 
     def by_grid(self, arrays: dict[str, Array]) -> list[dict[str, Array]]:
-        """`arrays` over all cells cut into those of each grid, with the predictions for its cells and bodies."""
+        """Split `arrays` over all cells by grid, and add the predictions for cells and bodies."""
         ends = np.cumsum([grid.size for grid in self.grids])
         return [
             {name: values[end - grid.size : end] for name, values in arrays.items()} | prediction.variables
@@ -65,9 +65,9 @@ class Plan:
 
 
 def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
-    """Give each cell of `grids`, by default all cells of `config`, its method, step, limits and start.
+    """Prepare each cell of `grids`, by default all cells of `config`: method, step, limits and initial state.
 
-    What these cells need and no cache holds is compiled first; `also` as of `sweep.kernels.build.build`.
+    Kernels that no cache holds are compiled first; `also` as for `sweep.kernels.build.build`.
     """
     grids = grids or (config.grid,)
     chosen = choose(config, *grids)
@@ -79,21 +79,21 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
 
 
 def kernels(config: Config, chosen: Sequence[Cells] = ()) -> list[Kernel]:
-    """The kernels that run the cells of `chosen`, or all that a run may need."""
+    """Return the kernels that run the cells of `chosen`, or all that a run may need."""
     method = config.integrator.method
     names = [each.method for each in chosen] or (methods.allowed(config.equations) if method == AUTO else [method])
     return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
 
 def kernel_of(method: str, config: Config) -> Kernel:
-    """The kernel of a method for the model and the measurements of a configuration."""
+    """Return the kernel of a method for the model and the measurements of a configuration."""
     return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
 
 
 def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
-    """Give each cell of `grids` that has a possible body its method and step; no kernel is compiled, no image made.
+    """Choose method and step of each cell of `grids` that has a possible body, without compiling or initial states.
 
-    Without any there is one choice, of no cells.
+    If there are no such cells, there is one choice with no cells.
     """
     model, integrator = config.equations, config.integrator
     each = [grid.columns() for grid in grids]
@@ -115,13 +115,18 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
     return tuple(choices)
 
 
-def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, rules: Array) -> Cells:
+def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, step_rule: Array) -> Cells:
+    how, fixed = config.integrator, config.integrator.step != "auto"
+    rules = Rules(
+        how.t_end, how.tolerance, how.patience, how.stop_when_settled, fixed, how.estimate_errors,
+        config.repeats and not fixed,
+    )  # fmt: skip
     blank = np.full((6, len(cells)), np.nan), np.empty((0, 0))
-    return Cells(kernel, config.equations, Rules.of(config), cells, columns, step, rules, *blank)
+    return Cells(kernel, config.equations, rules, cells, columns, step, step_rule, *blank)
 
 
 def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Array]:
-    """Step of each cell with a method, the configured or the automatic one, and what set it; both of shape (cells,)."""
+    """Return the step of each cell with a method, configured or automatic, and what set it; both of shape (cells,)."""
     step, cells = config.integrator.step, len(next(iter(columns.values())))
     if step == "auto":
         return methods.automatic_step(method, config.equations, columns, config.integrator.tolerance)

@@ -1,4 +1,4 @@
-"""A run that simulates only the nodes near changes of the outcome, and infers the nodes between them."""
+"""Runs only the nodes near changes of the outcome, and infers the nodes between them."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from sweep.results.store import Store
 
 
 class Refined(Some):
-    """The nodes asked for so far, with tiles of their own for each pass.
+    """The requested nodes, with separate tiles for each pass.
 
-    The results of a pass alone decide what the next one asks for, so a resumed run builds the same tiles.
+    Each pass depends only on the results of earlier passes, so a resumed run builds the same tiles.
     """
 
     def __init__(self, config: Config, store: Store) -> None:
@@ -30,9 +30,9 @@ class Refined(Some):
         size = self.grid.size
         self._outcomes = Outcomes(np.zeros(size, np.int32), np.full(size, UNKNOWN, np.int8))
         bad = [config.equations.impossible(columns) for columns in distinct(self.grid, tuple(self.grid.axes))]
-        self._outcomes.status[np.concatenate(bad)] = IMPOSSIBLE  # they need not be simulated
-        self._told = Outcomes(*(each.copy() for each in self._outcomes))
-        """What is known of the nodes, simulated or inferred."""
+        self._outcomes.status[np.concatenate(bad)] = IMPOSSIBLE  # impossible bodies need not be simulated
+        self._inferred = Outcomes(*(each.copy() for each in self._outcomes))
+        """Known outcomes of the nodes, simulated or inferred."""
         self._margins = {name: np.full(size, np.nan) for name in ("margin_more", "margin_fewer")}
         self._learned = 0
         """Tiles whose results are known."""
@@ -42,12 +42,12 @@ class Refined(Some):
         self._shape = tuple(self.grid.shape[i] for i in refined)
         nodes = np.moveaxis(np.arange(size).reshape(self.grid.shape), refined, range(-len(refined), 0))
         self._maps: Nodes = nodes.reshape(-1, prod(self._shape) if refined else size)
-        """Indices of the nodes of each map, one for each value of the other axes."""
+        """Indices of the nodes of each map, one map for each value of the other axes."""
         self._open = [*range(len(self._maps))]
         """Maps that are not complete."""
 
     def grow(self) -> bool:
-        """Add the nodes to simulate next, judging by the results of all tiles so far.  False if there are none."""
+        """Add the nodes to simulate next, judging by all results so far; return False if there are none."""
         known = {**self._outcomes._asdict(), **self._margins}
         for i in range(self._learned, len(self.tiles)):
             found, cells = self.store.load(i), self.cells[self.tiles[i]]
@@ -59,29 +59,29 @@ class Refined(Some):
         return self._add(np.sort(np.concatenate([*asked.values()])))
 
     def _searched(self, i: int) -> Nodes:
-        """The nodes of a map to simulate next; keep what is known of all its nodes."""
+        """Return the nodes of a map to simulate next, and update the known outcomes of the map."""
         nodes: Nodes = self._maps[i]
         known = Outcomes(*(each[nodes] for each in self._outcomes))
         if self._shape:
             counts = Counts.of({**known._asdict(), **{name: each[nodes] for name, each in self._margins.items()}})
-            new, told = search(self._shape, known, counts, self.config.refine)
+            new, outcomes = search(self._shape, known, counts, self.config.refine)
         else:
-            new, told = np.flatnonzero(known.status == UNKNOWN), known
-        for whole, part in zip(self._told, told, strict=True):
+            new, outcomes = np.flatnonzero(known.status == UNKNOWN), known
+        for whole, part in zip(self._inferred, outcomes, strict=True):
             whole[nodes] = part
         return nodes[new]
 
     def dataset(self) -> xr.Dataset:
-        """The labelled dataset over all nodes, in memory."""
-        words = self._attributes(len(self.cells)) | {"simulated_share": len(self.cells) / self.grid.size}
-        return dataset.label(self.config, self.grid, self._arrays(self._gather()), words)
+        """Return the labelled dataset over all nodes, in memory."""
+        attributes = self._attributes(len(self.cells)) | {"simulated_share": len(self.cells) / self.grid.size}
+        return dataset.label(self.config, self.grid, self._arrays(self._gather()), attributes)
 
     def _arrays(self, found: Mapping[str, Array]) -> dict[str, Array]:
-        """All variables over the nodes or their bodies, by formula, simulated (`found`) or inferred."""
+        """Return all variables over the nodes or their bodies: by formula, simulated (`found`) or inferred."""
         arrays = dataset.assemble(
             self.grid, ((tile, formulas(self.config.tier, self.grid.part(tile))) for tile in self.grid.tiles(TILE))
         )
-        # No flag says "not simulated", so flags that cannot be inferred are left out.
+        # No flag means "not simulated", so flags that cannot be inferred are left out.
         others = {n for n in found.keys() - arrays.keys() if n in dataset.VARIABLES and not dataset.VARIABLES[n].flags}
         self._place(self.cells, {name: found[name] for name in others - {"reversals"}}, arrays)
-        return arrays | self._told._asdict() | {"inferred": self._outcomes.status == UNKNOWN}
+        return arrays | self._inferred._asdict() | {"inferred": self._outcomes.status == UNKNOWN}

@@ -1,19 +1,19 @@
-"""Which nodes of a map to simulate if counts change only across lines, and the outcomes of the other nodes.
+"""Chooses which nodes of a map to simulate, and infers the outcomes of the others, if counts change only across lines.
 
 The map is cut into patches with 2^(depth + 1) intervals along each axis.
 
 1. The corners of each patch, the places halfway between them and its middle are simulated: every 2^depth-th node.
 2. Parabolas along the axes, through the distances in spin of these nodes from where a count begins
-   (`sweep.results.margins`), tell how far the nodes between them are.  Such a node is inferred if all its distances are
-   clear of zero by a fortieth of how far the parabolas are from straight lines.  Where margins are not known, it is
+   (`sweep.results.margins`), estimate how far the nodes between them are.  A node is inferred if all its distances are
+   clear of zero by a fortieth of how far the parabolas are from straight lines.  Where margins are unknown, it is
    inferred if all simulated nodes of the patch have one outcome.
 3. A patch is halved along each axis around the nodes that are left, and around those that a neighbouring patch has
    simulated and that contradict it, and so on, down to patches of two intervals.
-4. In the end the inferred nodes beside another outcome are simulated, and those a few nodes around the end of a strip:
-   a strip of one outcome may be thinner than a node, and go on between two of them.  So are those inferred to have no
-   possible body: which these are is known without a simulation.
+4. In the end the inferred nodes next to another outcome are simulated, and so are those around the end of a strip: a
+   strip of one outcome may be thinner than a node, and continue between two of them.  Nodes inferred to have no
+   possible body are simulated too: which bodies are impossible is known without a simulation.
 
-Everything follows from the results known so far, so a search can be resumed from these alone.
+Everything follows from the results known so far, so a search can be resumed from them alone.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ Nodes = NDArray[np.intp]
 UNKNOWN = -1
 """Status of a node that is not simulated; no other is negative."""
 
-# How far from a boundary a node has to be, relative to the largest distance of the parabolas from straight lines.
+# Required distance of a node from a boundary, relative to the largest distance of the parabolas from straight lines.
 # Over 512 x 512 cells of configs/mu_b.yaml with 32 intervals a patch, 0.025, 0.05, 0.1 and 0.2 simulate 10.5, 10.5,
 # 10.9 and 11.7 %; 1, 4, 2 and 2 cells are wrong.
 _CLEAR = 0.025
 
-# How many nodes around the end of a strip are simulated.  Over the same map, none, 2, 3, 4, 5 and 6 simulate 9.5, 9.6,
-# 9.8, 10.1, 10.5 and 10.9 %, and 16, 13, 6, 1, 1 and 1 cells are wrong.
+# Number of nodes around the end of a strip that are simulated. Over the same map, none, 2, 3, 4, 5 and 6 simulate 9.5,
+# 9.6, 9.8, 10.1, 10.5 and 10.9 %, and 16, 13, 6, 1, 1 and 1 cells are wrong.
 _AROUND = 5
 
 # Weights of the two corners at three places of a straight line.
@@ -50,20 +50,20 @@ _STRAIGHT = np.array([[1.0, 0.0], [0.5, 0.5], [0.0, 1.0]])
 
 
 class Outcomes(NamedTuple):
-    """What is known of the nodes of a map, arrays of shape (nodes,)."""
+    """Known outcomes of the nodes of a map, arrays of shape (nodes,)."""
 
     reversals: Array
     status: Array
     """`UNKNOWN` where not known."""
 
     def differ(self, these: Any, others: Any) -> Array:
-        """Tell where the outcomes of these nodes are not those of the others."""
+        """Return where the outcomes of these nodes differ from those of the others."""
         found: Array = (self.status[these] != self.status[others]) | (self.reversals[these] != self.reversals[others])
         return found
 
 
 def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: int) -> tuple[Nodes, Outcomes]:
-    """The nodes to simulate next, in ascending order, and the outcomes as far as they are known or inferred.
+    """Return the nodes to simulate next, in ascending order, and all known or inferred outcomes.
 
     If there are no more nodes, each has an outcome.
 
@@ -71,11 +71,11 @@ def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: i
     ----------
     shape : of the map; each axis has more than 2^(depth + 1) nodes
     simulated : the outcomes that are known
-    counts : counts and margins of the nodes, of shape (nodes,); margins are NaN where they are not known
+    counts : counts and margins of the nodes, of shape (nodes,); margins are NaN where unknown
     depth : the first nodes to simulate lie 2^depth apart; at least 1
     """
     known: Array = simulated.status != UNKNOWN
-    told = Outcomes(*(each.copy() for each in simulated))
+    outcomes = Outcomes(*(each.copy() for each in simulated))
     size, wanted = 2 ** (depth + 1), list[Nodes]()
     patches = _largest(shape, size)
     while len(patches):
@@ -84,38 +84,38 @@ def search(shape: tuple[int, ...], simulated: Outcomes, counts: Counts, depth: i
         wanted.append(nodes[~ready].ravel())
         if size == 2:
             break
-        patches = _infer(told, known, counts, nodes[ready], size, shape)
+        patches = _infer(outcomes, known, counts, nodes[ready], size, shape)
         size //= 2
     new = np.unique(np.concatenate(wanted))
     new = new[~known[new]]
     if not len(new):
-        doubtful = _beside_changes(told, shape) | _around_ends(told, shape) | (told.status == IMPOSSIBLE)
+        doubtful = _beside_changes(outcomes, shape) | _around_ends(outcomes, shape) | (outcomes.status == IMPOSSIBLE)
         new = np.flatnonzero(doubtful & ~known)
-    return new, told
+    return new, outcomes
 
 
-def _infer(told: Outcomes, known: Array, counts: Counts, nodes: Nodes, size: int, shape: tuple[int, ...]) -> Nodes:
-    """Infer what lies between the known `nodes` of patches, one patch a row, in place; give the parts that are left."""
+def _infer(outcomes: Outcomes, known: Array, counts: Counts, nodes: Nodes, size: int, shape: tuple[int, ...]) -> Nodes:
+    """Infer the nodes between the known `nodes` of patches, one patch a row, in place; return the remaining parts."""
     first = nodes[:, :1]
     inside = first + _offsets(shape, range(size + 1))
     count, left = _by_margins(counts, nodes, size, len(shape))
-    alone = np.isnan(count[:, 0]) | (told.status[nodes] != told.status[first]).any(axis=1)
-    count[alone] = told.reversals[first][alone]
-    left[alone] = np.any(told.differ(nodes, first), axis=1)[alone, None]
-    here, status = known[inside], np.broadcast_to(told.status[first], inside.shape)
-    contradicted = (told.reversals[inside] != count) | (told.status[inside] != status)
+    alone = np.isnan(count[:, 0]) | (outcomes.status[nodes] != outcomes.status[first]).any(axis=1)
+    count[alone] = outcomes.reversals[first][alone]
+    left[alone] = np.any(outcomes.differ(nodes, first), axis=1)[alone, None]
+    here, status = known[inside], np.broadcast_to(outcomes.status[first], inside.shape)
+    contradicted = (outcomes.reversals[inside] != count) | (outcomes.status[inside] != status)
     left = np.where(here, contradicted, left)
     new = ~here & ~left
-    told.reversals[inside[new]], told.status[inside[new]] = count[new], status[new]
+    outcomes.reversals[inside[new]], outcomes.status[inside[new]] = count[new], status[new]
     return _parts(nodes[:, 0], left, size, shape)
 
 
 def _by_margins(counts: Counts, nodes: Nodes, size: int, axes: int) -> tuple[Array, Array]:
-    """The count of each node inside each patch, by the margins at three nodes an axis, and where it is not sure.
+    """Return the count of each node inside each patch, by the margins at three nodes an axis, and where it is unsure.
 
     Returns
     -------
-    Both of shape (patches, nodes inside); NaN for a patch in which a margin is not known.
+    Both of shape (patches, nodes inside); NaN for a patch with an unknown margin.
     """
     weights, straight = _over(_parabola(size), axes), _over(_STRAIGHT, axes)
     corners = np.flatnonzero([1 not in place for place in product(range(3), repeat=axes)])
@@ -135,7 +135,7 @@ def _by_margins(counts: Counts, nodes: Nodes, size: int, axes: int) -> tuple[Arr
 
 
 def _parts(patches: Nodes, left: Array, size: int, shape: tuple[int, ...]) -> Nodes:
-    """The halves of patches along each axis that have a node which is `left`, by their first nodes."""
+    """Return the halves of patches along each axis with a node in `left`, by their first nodes."""
     half, axes = size // 2, len(shape)
     left = left.reshape(len(patches), *[size + 1] * axes)
     parts = list[Nodes]()
@@ -146,42 +146,42 @@ def _parts(patches: Nodes, left: Array, size: int, shape: tuple[int, ...]) -> No
 
 
 def _largest(shape: tuple[int, ...], size: int) -> Nodes:
-    """The first nodes of the largest patches, of which the last reach to the end of an axis and overlap with others."""
+    """Return the first nodes of the largest patches; the last ones reach to the end of an axis and overlap others."""
     starts = [np.unique(np.append(np.arange(0, n - size, size), n - 1 - size)) for n in shape]
     return np.ravel_multi_index(np.meshgrid(*starts, indexing="ij"), shape).ravel()
 
 
 def _offsets(shape: tuple[int, ...], places: Any) -> Nodes:
-    """How far the nodes at these places along each axis are from the first node of a patch."""
+    """Return the distance of the nodes at these places along each axis from the first node of a patch."""
     return np.ravel_multi_index(np.meshgrid(*[np.asarray(places)] * len(shape), indexing="ij"), shape).ravel()
 
 
 def _parabola(size: int) -> Array:
-    """The weights of three nodes, at the ends and halfway, at all places along a patch: shape (size + 1, 3)."""
+    """Return the weights of three nodes, at the ends and halfway, at all places along a patch: shape (size + 1, 3)."""
     t = np.arange(size + 1) / size
     return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
 
 
 def _over(weights: Array, axes: int) -> Array:
-    """Weights along one axis, as those over several."""
+    """Return the weights along one axis, as those over several."""
     return reduce(np.kron, [weights] * axes)
 
 
-def _beside_changes(told: Outcomes, shape: tuple[int, ...]) -> Array:
-    """The nodes with a neighbour along an axis that has another outcome, shape (nodes,)."""
-    beside, index = np.zeros(len(told.status), bool), np.arange(len(told.status)).reshape(shape)
+def _beside_changes(outcomes: Outcomes, shape: tuple[int, ...]) -> Array:
+    """Return the nodes with a neighbour along an axis that has another outcome, shape (nodes,)."""
+    beside, index = np.zeros(len(outcomes.status), bool), np.arange(len(outcomes.status)).reshape(shape)
     for axis in range(len(shape)):
         along = np.moveaxis(index, axis, 0)
-        changes = told.differ(along[:-1], along[1:])
+        changes = outcomes.differ(along[:-1], along[1:])
         beside[along[:-1][changes]] = beside[along[1:][changes]] = True
     return beside
 
 
-def _around_ends(told: Outcomes, shape: tuple[int, ...]) -> Array:
-    """The nodes near one that has hardly a neighbour, also diagonally, of the same outcome, shape (nodes,)."""
-    outcome = np.stack([each.reshape(shape) for each in told], axis=-1)
+def _around_ends(outcomes: Outcomes, shape: tuple[int, ...]) -> Array:
+    """Return the nodes near one with hardly a neighbour (diagonals included) of its outcome, shape (nodes,)."""
+    outcome = np.stack([each.reshape(shape) for each in outcomes], axis=-1)
     padded = np.pad(outcome, [(1, 1)] * len(shape) + [(0, 0)], mode="edge")
-    alike = np.zeros(shape, np.int8)  # with the node itself
+    alike = np.zeros(shape, np.int8)  # including the node itself
     for offset in product(range(3), repeat=len(shape)):
         there = padded[tuple(slice(first, first + n) for first, n in zip(offset, shape, strict=True))]
         alike += (there == outcome).all(axis=-1)

@@ -1,4 +1,4 @@
-"""Carries what a run tells its user while it goes on."""
+"""Passes progress and messages from a run to its user."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from sweep.kernels.status import FAILURES
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run has come."""
+    """The progress of a run."""
 
     cells: float
-    """To be simulated in all, as far as known: a refined run adds more with each pass."""
+    """Cells to simulate in total, as far as known: a refined run adds more with each pass."""
     done: float
-    """A fraction where parts of a cell count, as in a search."""
+    """Finished cells; a fraction where parts of a cell count, as in a search."""
     failed: int
     done_before: float
-    """Of `done`, those finished by an earlier run."""
+    """The part of `done` that an earlier run finished."""
     seconds: float
-    """Since this run began."""
+    """Seconds since this run began."""
     unit: str = "cells"
     """What is counted."""
 
 
 class Reporter:
-    """Receives what a run has to tell.  This one stays silent; override what should be shown."""
+    """Receives progress and messages of a run. This one stays silent; override what should be shown."""
 
     def chunk(self, progress: Progress) -> None:
-        """Another chunk is done."""
+        """Report that another chunk is done."""
 
     def note(self, message: str) -> None:
-        """Something worth a line."""
+        """Report a message."""
 
 
 class Count:
-    """Adds up finished tiles and the finished cells of running ones for a reporter."""
+    """Adds up finished tiles and the finished cells of running tiles for a reporter."""
 
     def __init__(self, reporter: Reporter) -> None:
         self.reporter, self.began = reporter, time.perf_counter()
@@ -47,13 +47,13 @@ class Count:
         self._farthest = 0.0
 
     def expect(self, cells: int, todo: int) -> None:
-        """Of `cells` in all, `todo` are still to do; the others not counted so far are an earlier run's."""
+        """Begin with `todo` cells to do out of `cells`; the others not counted so far come from an earlier run."""
         there = cells - todo - self.done
         self.cells, self.before, self.done = cells, self.before + there, self.done + there
 
     def chunk(self, done: float, failed: int) -> None:
         """Report how many of the cells being computed are done, and how many have failed."""
-        self._farthest = max(self._farthest, self.done + done)  # a guess of what is left may grow
+        self._farthest = max(self._farthest, self.done + done)  # an estimate of the remaining work may grow
         self._report(self._farthest, self.failed + failed)
 
     def tile(self, status: Array) -> None:

@@ -1,10 +1,10 @@
 """config → grid → model → kernel → executor → store → plots.
 
-The configuration says which grid of cells to run, and the grid is cut into tiles.  For each tile
-`engine.plan` chooses model, kernel and steps, and `engine.executor` advances its trajectories to
-their ends: in this process (`engine.local`) or in others (`engine.cluster`).  A store keeps the
-finished tiles.  `engine.whole` or, where only some cells are simulated, `engine.refined` makes the
-dataset of them, and `plots` draws its maps.  `engine.enlarged` takes over what an earlier run has left.
+The configuration defines the grid of cells, and the grid is cut into tiles.  For each tile `engine.plan` chooses model,
+kernel and steps, and `engine.executor` advances its trajectories to their ends: in this process (`engine.local`) or in
+others (`engine.cluster`).  A store keeps the finished tiles.  `engine.whole` or, where only some cells are simulated,
+`engine.refined` assembles the dataset, and `plots` draws its maps. `engine.enlarged` reuses the results of an earlier
+run.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 LARGE = 2_000_000
-"""Cells of the largest dataset that is loaded into memory unasked."""
+"""Most cells of a dataset that is loaded into memory."""
 
 
 @deferred()
@@ -53,7 +53,7 @@ def run(
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """As `sweep.api.run`; what there is to tell goes to `reporter` alone."""
+    """Run as `sweep.api.run`; messages go to `reporter` only."""
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
         raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
@@ -95,7 +95,7 @@ def run(
 
 
 def _forget_pictures(config: Config, files: RunFiles) -> None:
-    """Remove the pictures of a dataset that is there, or was: they would pass for those of the next one."""
+    """Remove the pictures of an existing or former dataset: they would be taken for those of the next one."""
     named = files.pictures(config.picture)
     with suppress(StoreError), open_dataset(files.dataset, load=False) as there:
         named |= files.pictures(quantities.pictured(there))
@@ -106,9 +106,9 @@ def _forget_pictures(config: Config, files: RunFiles) -> None:
 def _earlier(
     config: Config, found: Identity | None, identity: Identity, files: RunFiles, rerun: str | None
 ) -> Earlier | None:
-    """Read what an earlier dataset, there now or when an interrupted run began, has of the cells of `config`.
+    """Read the cells of `config` from an earlier dataset, there now or when an interrupted run began.
 
-    `found` is the identity of the one that is there.
+    `found` is the identity of the existing dataset.
 
     Raises
     ------
@@ -153,7 +153,7 @@ def carry_out(result: Whole, store: Store, reporter: Reporter, client: Client | 
 
 
 def _kept(result: Whole, store: Store, running: Running | None) -> str:
-    """Find what an earlier run left."""
+    """Return the state rows that an earlier run left, and report how far it got."""
     grid = result.simulated().grid
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
     started = sum(len(table) for name, table in running.tables.items() if name.endswith("images")) if running else 0
@@ -177,10 +177,10 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
 
 
 def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
-    """Draw the pictures of a run beside its dataset, unless they are there."""
-    from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
+    """Draw the pictures of a run next to its dataset, unless they exist."""
+    from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
 
-    others = quantities.pictured(result) != [*variables]  # than when the dataset was made
+    others = quantities.pictured(result) != [*variables]  # newer than the dataset
     for path, variable in files.pictures(variables).items():
         if others or not path.exists():
             try:

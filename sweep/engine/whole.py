@@ -1,4 +1,4 @@
-"""A run of all cells or of some of them, and the dataset that its finished tiles make."""
+"""Runs all cells or some of them, and makes the dataset from the finished tiles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sweep.results.store import Store
 
 
 def tile_size(cells: int) -> int:
-    """Cells per tile, of which a worker that dies loses one, and the file stores one in a piece."""
+    """Cells per tile: a dying worker loses one tile, and the file stores one tile as a chunk."""
     return int(np.clip(cells // 32, 1024, 8192))
 
 
@@ -32,7 +32,7 @@ class Whole:
         self.tiles: list[Tile] = []
 
     def grow(self) -> bool:
-        """Add the tiles to simulate next: all of them, once.  False if there are no more."""
+        """Add the tiles to simulate next: all of them, once. Return False if there are no more."""
         if self.tiles:
             return False
         self.tiles = self.grid.tiles(tile_size(self.grid.size))
@@ -43,15 +43,15 @@ class Whole:
         return self.config
 
     def dataset(self) -> xr.Dataset:
-        """The labelled dataset, in memory."""
+        """Return the labelled dataset, in memory."""
         return self._labelled(self._gather())
 
     def save(self, path: Path) -> None:
-        """Write the labelled dataset, tile by tile; it need not fit into memory.
+        """Write the labelled dataset, tile by tile; it may be larger than memory.
 
-        Every tile is read twice: the file begins with what they have cost.
+        Every tile is read twice, since the file begins with its total cost.
         """
-        if self.config.samples:  # a probability is of all samples together
+        if self.config.samples:  # a probability needs all samples together
             netcdf.write(path, self.dataset())
             return
         tails = {name: values.shape[1:] for name, values in self.store.load(0).items()}
@@ -64,7 +64,7 @@ class Whole:
         netcdf.write(path, self._labelled(empty), sizes, pieces)
 
     def _cut(self, cells: int) -> bool:
-        """Simulate so many cases more, in tiles of their own; False if there are none."""
+        """Simulate this many more cases, in separate tiles; return False if there are none."""
         first, step = self.tiles[-1][0].stop if self.tiles else 0, tile_size(cells)
         self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
         return cells > 0
@@ -74,24 +74,24 @@ class Whole:
         return dataset.assemble(self.simulated().grid, self._finished())
 
     def _finished(self) -> Iterator[tuple[Tile, dict[str, Array]]]:
-        """Read the tiles one after another, with what each holds."""
+        """Yield the tiles one after another, with their contents."""
         return ((tile, self.store.load(i)) for i, tile in enumerate(self.tiles))
 
     def _labelled(self, arrays: Mapping[str, Array]) -> xr.Dataset:
-        """Give `arrays` over all cells their coordinates and attributes."""
+        """Label `arrays` over all cells with coordinates and attributes."""
         return dataset.label(self.config, self.grid, arrays, self._attributes(self.grid.size))
 
     def _attributes(self, cells: int) -> dict[str, Any]:
-        """Where the numbers of a finished run come from, and what its `cells` have cost."""
+        """Return the provenance attributes of a finished run, and the cost of its `cells`."""
         costs = [(float(tile["seconds"]), str(tile["cpu"])) for _, tile in self._finished()]
         seconds, cpus = sum(seconds for seconds, _ in costs), {cpu for _, cpu in costs}
         return provenance(self.config, seconds, cells, cpus) | described_impossible(self.config)
 
 
 class Some(Whole):
-    """Cells of a configuration that are simulated as a table of cases, which may grow; the others are known otherwise.
+    """Some cells of a configuration as a growing table of cases; the rest come from an earlier run or by inference.
 
-    A table of cases has no neighbours, so that it is not refined.
+    A table of cases has no neighbours, so it is not refined.
     """
 
     def __init__(self, config: Config, store: Store) -> None:
@@ -111,12 +111,12 @@ class Some(Whole):
         netcdf.write(path, self.dataset())
 
     def _add(self, cells: Array) -> bool:
-        """Simulate these cells too, in tiles of their own; False if there are none."""
+        """Simulate these cells too, in separate tiles; return False if there are none."""
         self.cells = np.concatenate([self.cells, cells])
         return self._cut(len(cells))
 
     def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:
-        """Write what was `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""
+        """Write `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""
         _, body = self.grid.bodies()
         for name, (over, spec) in dataset.layout(self.grid, found).items():
             if name not in arrays:

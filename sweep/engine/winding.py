@@ -1,6 +1,6 @@
-"""Says which rattles are watched while they roll round and round, and when they will have wound down.
+"""Decides which rattles are watched while they roll round and round, and when they will have wound down.
 
-What is seen of them is in `sweep.kernels.measures.decay`.
+`sweep.kernels.measures.decay` does the watching.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from sweep.kernels.measures.decay import EVERY, LEFT, LOOKS, NEXT
 from sweep.models.general import rigid_body, starts
 from sweep.models.theory.rocking import frequencies
 
-# A window, as a share of the patience.
+# Length of a window, as a share of the patience.
 _WINDOW = 0.1
 
-# A rattle rolls round where the body turns by more than one radian while its two modes gain half of one on each other.
+# A rattle rolls round if the body turns by more than one radian while its two modes gain half a radian on each other.
 _ROLLS = 0.5
 
 
 def whole_blocks(steps: Array) -> Array:
-    """So many steps, rounded up: adams goes on only from the end of a block, where its history is that of the state."""
+    """Return the steps, rounded up: adams continues only from the end of a block, where its history is complete."""
     return np.asarray(BLOCK * np.ceil(steps / BLOCK))
 
 
 def watch(cells: Cells, images: Array) -> None:
-    """Let `images` of cells at t = 0 be watched, in place: from the start if they roll round, or in the last window."""
+    """Have `images` of cells at t = 0 watched, in place: from the start if they roll round, or in the last window."""
     table, patience = cells.kernel.table(images), cells.rules.patience
     if NEXT not in table.layout or patience is None:
         return
@@ -40,7 +40,6 @@ def watch(cells: Cells, images: Array) -> None:
 
 
 def winds_down(cells: Cells) -> Array:
-    """Tell whose rattle will have wound down before `t_end`, so that what then happens can be followed, (cells,)."""
-    table, (patience, t_end) = cells.kernel.table(cells.images), (cells.rules.patience or 0.0, cells.rules.t_end)
-    left = table[LEFT] if LEFT in table.layout else np.zeros(len(cells.cells))
+    """Return whose rattle will have wound down before `t_end`, so that the rest can be followed, (cells,)."""
+    patience, t_end, left = cells.rules.patience or 0.0, cells.rules.t_end, cells.recorded(LEFT)
     return np.asarray((left > 0) & (left * _WINDOW * patience < t_end - patience))

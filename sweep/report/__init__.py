@@ -1,1 +1,1 @@
-"""Says what the reports share: rows with a verdict, tables, figures, and one HTML page that needs no network."""
+"""Defines what reports share: rows with a verdict, tables, figures, and one HTML page that needs no network."""

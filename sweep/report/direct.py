@@ -1,4 +1,4 @@
-"""Trajectories directly from columns of parameters, without configuration, labels or files."""
+"""Runs trajectories directly from columns of parameters, without configuration, labels or files."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ class Ends:
     t_end: float
 
     def __getitem__(self, name: str) -> Array:
-        """A simulated variable of the dataset, by its name there, of shape (cells,)."""
+        """Return a simulated variable of the dataset by name, of shape (cells,)."""
         return measured(self.kernel, self.images, self.t_end)[name]
 
     @property
     def states(self) -> Array:
-        """The model's states, of shape (states, cells)."""
+        """Return the model's states, of shape (states, cells)."""
         return self.kernel.states(self.images)
 
 
 def standard(**parameters: Any) -> dict[str, Array]:
-    """The paper's standard case at μ = 75, with some parameters replaced, as columns."""
+    """Return the paper's standard case at μ = 75, with some parameters replaced, as columns."""
     values = {name: p.default for name, p in PAPER_PARAMETERS.items()} | {"mu": 75.0} | parameters
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in values.values()))
     return {name: array.copy() for name, array in zip(values, arrays, strict=True)}
@@ -50,7 +50,7 @@ def standard(**parameters: Any) -> dict[str, Array]:
 
 @cache
 def make_kernel(method: str, model: Model, measure: tuple[str, ...] | None = None) -> Kernel:
-    """The compiled kernel, with these measurements, by default with those of a run."""
+    """Return the compiled kernel with these measurements, by default those of a run."""
     kernel = methods.make_kernel(method, model, measures.default(model) if measure is None else measure)
     build([kernel])
     kernel.advancing.compile()
@@ -76,10 +76,9 @@ def simulate(
     columns : physical parameters by name, each of shape (cells,)
     t_end : time limit in sqrt(c/g)
     step : in sqrt(c/g), for all or of shape (cells,); by default the automatic one of `tolerance`
-    ranges : whether the kernel gets the spins at which the rattle decays; without them nothing settles
+    ranges : whether the kernel is given the spins at which the rattle decays; without them nothing settles
     settle : whether a trajectory ends as soon as it has settled
-    decide : whether a failure is repeated with shorter steps until it is certain, as `sweep.run` does it;
-        not without `ranges`
+    decide : whether a failure is repeated with shorter steps until it is certain, as `sweep.run` does; needs `ranges`
     """
     chosen = MODELS[model]
     kernel = make_kernel(method, chosen)

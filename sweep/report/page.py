@@ -1,4 +1,4 @@
-"""Sections of a report as text for the terminal, and as one HTML page that needs no network."""
+"""Renders sections of a report as text for the terminal, and as one HTML page that needs no network."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sweep.results.writing import replacing
 
 
 def text(section: Section) -> str:
-    """A section as text for the terminal."""
+    """Return a section as text for the terminal."""
     lines = [f"\n{section.title}"]
     for row in section.rows:
         verdict, expected = "ok  " if row.holds else "FAIL", f"(expected: {row.expected})"
@@ -33,7 +33,7 @@ def write(path: Path, title: str, about: str, sections: Iterable[Section], heads
     Parameters
     ----------
     about : a line for the top of the page, after the number of rows that hold
-    heads : column heads for the rows' source, expected and found
+    heads : column headings for the rows' source, expected and found
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     sections = list(sections)
@@ -48,7 +48,7 @@ def write(path: Path, title: str, about: str, sections: Iterable[Section], heads
 
 
 def _png(figure: Figure) -> str:
-    """The figure as a PNG in base64."""
+    """Return the figure as a PNG in base64."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png")
     return base64.b64encode(stream.getvalue()).decode()

@@ -1,4 +1,4 @@
-"""Statements beside what we find, and whether the two agree."""
+"""Defines rows of a report: statements, our results, and whether the two agree."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Table = tuple[str, list[list[str]]]
 class Row:
     what: str
     source: str
-    """The label of an equation or figure, a section, or the method that is tested."""
+    """Equation, figure, section or method being tested."""
     expected: str
     found: str
     difference: str
@@ -23,7 +23,7 @@ class Row:
     """The reason for the tolerance."""
     holds: bool
     remark: str = ""
-    """What we found where the source is wrong or says nothing."""
+    """Our result where the source is wrong or silent."""
 
 
 @dataclass
@@ -38,18 +38,18 @@ class Section:
 
 
 def against(what: str, source: str, expected: float, found: float, tolerance: float, why: str, remark: str = "") -> Row:
-    """A number that must agree with the expected one to an absolute tolerance."""
+    """Compare a number with the expected one to an absolute tolerance."""
     numbers = (f"{expected:.6g}", f"{found:.6g}", f"{found - expected:.2g}", f"{tolerance:.2g}")
     return Row(what, source, *numbers, why, abs(found - expected) <= tolerance, remark)
 
 
 def below(what: str, source: str, found: float, bound: float, why: str) -> Row:
-    """A number that must stay below a bound."""
+    """Check that a number stays below a bound."""
     return Row(what, source, f"< {bound:g}", f"{found:.3g}", "", f"{bound:g}", why, found < bound)
 
 
 def states(
     what: str, source: str, expected: str, found: str, holds: bool, remark: str = "", why: str = "a statement"
 ) -> Row:
-    """A statement in words, which a computation confirms or not."""
+    """Record whether a computation confirms a statement in words."""
     return Row(what, source, expected, found, "", "", why, holds, remark)

@@ -1,4 +1,4 @@
-"""Every number and figure of Takano (2011) beside ours: rows with a verdict, and figures drawn again."""
+"""Every number and figure of Takano (2011) compared with ours: rows with a verdict, and redrawn figures."""
 
 from sweep.reproduce.report import reproduce
 

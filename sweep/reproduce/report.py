@@ -1,4 +1,4 @@
-"""The report: all sections in order, on one page."""
+"""Writes the report: all sections in order, on one page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SECTIONS: tuple[Callable[[], Section], ...] = (
 
 
 def reproduce(output: Path, note: Callable[[str], None] = lambda _: None) -> list[Row]:
-    """Run all sections, write reproduce.html to `output`, and return the rows that do not hold."""
+    """Run all sections, write reproduce.html to `output`, and return the rows that do not agree."""
     sections = []
     for make in SECTIONS:
         sections.append(make())

@@ -1,4 +1,4 @@
-"""The paper's numbers as rows of the report."""
+"""Makes the paper's numbers rows of the report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sweep.report.rows import Row, against
 
 @cache
 def published() -> dict[str, dict[str, Any]]:
-    """The paper's numbers by name, from `data/takano2011.yaml` in this package."""
+    """Return the paper's numbers by name, from `data/takano2011.yaml` in this package."""
     with resources.as_file(resources.files("sweep.reproduce") / "data" / "takano2011.yaml") as path:
         return dict(document.read(path).values)
 

@@ -1,4 +1,4 @@
-"""The paper's numerical results (sec. sim), run again and drawn in its arrangement."""
+"""Repeats the paper's numerical results (its section on simulations), drawn in its arrangement."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sweep.studies.trajectory import trajectory
 def configure(
     model: str = "slip", t_end: float = 30_000.0, measure: Sequence[str] | None = None, **parameters: Any
 ) -> Config:
-    """The paper's standard case at μ = 60 with those parameters replaced that the model has; arrays are axes."""
+    """Return the paper's standard case at μ = 60, replacing the parameters that the model has; arrays are axes."""
     tier = TIERS[model]
     settings = {
         "name": "reproduce",
@@ -43,13 +43,13 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def slip_ratio() -> Section:
-    """Figs. v01vp1m100 … v02vp2m200: the acceleration of the slip is small compared with that of v_0."""
+    """Check figs. v01vp1m100 … v02vp2m200: the acceleration of the slip is small compared with that of v_0."""
     both = trajectory(configure(t_end=400.0), mu=[100, 200])
     section = Section("Is dv_p/dt small compared with dv_0/dt?")
     for i, mu in enumerate((100, 200)):
         figure = _figure(8, 3)
         for axes, component in zip(figure.subplots(1, 2), (1, 2), strict=True):
-            # Starting without slip makes it jump once; the figures show the amplitudes after that.
+            # Starting without slip makes it jump once; the figures show the amplitudes after the jump.
             late = both.isel(trajectory=i, time=both["time"].values > 1.0)
             v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
             ratio = float(np.sqrt((vp**2).mean() / (v0**2).mean()))
@@ -64,7 +64,7 @@ def slip_ratio() -> Section:
 
 
 def critical_spins() -> Section:
-    """Fig. nc21pm: below n_c1 the rattle decays, above n_c2 the spin reverses."""
+    """Check fig. nc21pm: below n_c1 the rattle decays, above n_c2 the spin reverses."""
     section = Section("Spins below, between and above the critical ones, μ = 75")
     figure = _figure(8, 6.5)
     for axes, starts in zip(figure.subplots(2, 1), ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
@@ -86,7 +86,7 @@ def _behaviour(grows: bool, reverses: bool) -> str:
 
 
 def friction() -> Section:
-    """Fig. mu601000: counts at three frictions, and the approach to rolling."""
+    """Check fig. mu601000: counts at three frictions, and the approach to rolling."""
     section = Section("From three reversals to rolling")
     figure = _figure(8, 6.5)
     top, bottom = figure.subplots(2, 1)
@@ -119,7 +119,7 @@ def _distance(one: xr.Dataset, other: xr.Dataset, until: float) -> float:
 
 
 def count_against_friction() -> Section:
-    """Fig. nrvsmu: predicted and simulated reversals against μ."""
+    """Check fig. nrvsmu: predicted and simulated reversals against μ."""
     maps = run(configure(mu=np.arange(20, 201, 2.0)))
     ours, theirs = (maps[name].values.astype(int) for name in ("reversals", "reversals_predicted"))
     mu = maps["mu"].values
@@ -145,7 +145,7 @@ def count_against_friction() -> Section:
 
 
 def count_against_shape() -> Section:
-    """Figs. vsb and lf: reversals against b, beside the form factor."""
+    """Check figs. vsb and lf: reversals against b, next to the form factor."""
     b = np.linspace(1.2, 9.8, 87)
     maps = run(configure(mu=np.array([100.0, 200.0]), b=b))
     figure = _figure(7, 6)
@@ -179,7 +179,7 @@ def count_against_shape() -> Section:
 
 
 def ladder() -> Section:
-    """How good each reduced model is: its counts, reversal times and cost beside the full model's."""
+    """Measure how good each reduced model is: counts, reversal times and cost compared with the full model."""
     mu, b = np.linspace(20, 200, 19), np.linspace(1.5, 9.0, 16)
     measure = ("reversals", "first_reversal")
     maps = {}
@@ -207,8 +207,8 @@ def ladder() -> Section:
 
 
 def _agreement(one: xr.Dataset, full: xr.Dataset) -> list[str]:
-    """Shares of equal counts and of those within one, and the errors of the reversals' times where counts are equal."""
-    if "mu" not in one.dims:  # it reverses for ever
+    """Return the shares of equal counts and of counts within one, and the errors of times where counts are equal."""
+    if "mu" not in one.dims:  # it keeps reversing
         first = abs(one["t_first_reversal"] / full["t_first_reversal"] - 1)
         return ["—", "—", f"{float(first.median()):.1%}", "—"]
     off = abs(one["reversals"].astype(int) - full["reversals"].astype(int))

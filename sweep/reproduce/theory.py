@@ -1,4 +1,4 @@
-"""Numbers from the paper's formulas, and what the models must agree on among themselves."""
+"""Checks numbers from the paper's formulas, and what the models must agree on among themselves."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ simulate = partial(direct.simulate, ranges=False)
 
 
 def formulas() -> Section:
-    """Numbers in the paper's text that follow from its formulas."""
+    """Check numbers in the paper's text that follow from its formulas."""
     body = standard()
     k = coefficients(body)
     plus, minus = (float(n[0]) for n in analytic.critical_spins(body))
@@ -56,7 +56,7 @@ def formulas() -> Section:
 
 
 def consistency() -> Section:
-    """How the models agree with each other and conserve what they must: a wrong coefficient shows here."""
+    """Check that the models agree and conserve what they must: a wrong coefficient would show here."""
     return Section("Agreement between the models", [*_slip_rows(), *_rolling_rows(), *_reduced_rows()])
 
 

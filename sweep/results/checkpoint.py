@@ -19,13 +19,13 @@ _IDENTITY = TypeAdapter(Identity)
 
 
 class Checkpoint(Store):
-    """A folder with a file for each finished tile and one for the tiles at work.
+    """A folder with a file for each finished tile and one for the running tiles.
 
     A file that cannot be read counts as missing: its cells are computed again.
     """
 
     def __init__(self, folder: Path, identity: Identity, note: Callable[[str], None]) -> None:
-        """Resume from `folder`, or make it.
+        """Resume from `folder`, or create it.
 
         Parameters
         ----------
@@ -34,7 +34,7 @@ class Checkpoint(Store):
         Raises
         ------
         StoreError
-            if `folder` is of another run.
+            if `folder` belongs to another run.
         """
         self.folder, self.note, self.identity = folder, note, identity
         head = folder / "identity.json"
@@ -76,7 +76,7 @@ class Checkpoint(Store):
         return None if self.done & set(tiles) else Running(tiles, tables, seconds)
 
     def _stamp(self, path: Path, names: Iterable[str]) -> str:
-        """Text in a file by which one of another tile or run, or one that lost an array, is recognised."""
+        """Return the text that identifies a file, which differs for another tile or run, or if an array is lost."""
         run = self.identity
         return f"{path.stem}: {', '.join(names)}; {run.config_hash} {run.source_hash}, {run.versions}"
 
@@ -86,10 +86,10 @@ class Checkpoint(Store):
             np.savez(stream, **named)
 
     def _read(self, path: Path) -> dict[str, Array] | None:
-        """The arrays of a file, its checksums verified; None if it is missing or cannot be used."""
+        """Return the arrays of a file, with checksums verified; None if it is missing or unusable."""
         try:
             with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
-                if damaged := archive.zip.testzip():  # numpy stops reading where a damaged header tells it to
+                if damaged := archive.zip.testzip():  # numpy stops reading where a damaged header ends the data
                     raise ValueError(f"checksum of {damaged}")
                 arrays = {name: archive[name] for name in archive.files}
             if arrays.pop("stamp", None) != self._stamp(path, arrays):
@@ -97,7 +97,7 @@ class Checkpoint(Store):
             return arrays
         except FileNotFoundError:
             return None
-        except Exception as error:  # what zipfile and numpy raise for a damaged archive is documented nowhere
+        except Exception as error:  # the errors that zipfile and numpy raise for a damaged archive are undocumented
             self.note(f"{path}: damaged ({error}); its cells are computed again")
             path.unlink()
             return None

@@ -17,17 +17,17 @@ from sweep.kernels.measures.misfit import Misfit
 def configuration(
     dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
 ) -> Config:
-    """Return the configuration of a dataset, without a film; its first case stands for a table of cases.
+    """Return the configuration of a dataset without its film; a table of cases is replaced by its first case.
 
     Parameters
     ----------
-    model : the keys by which the user names their model, if it is to run
+    model : the keys that name a user-defined model, if it is to run
     announce : called with a message before user code runs; None to refuse a user-defined model
 
     Raises
     ------
     ConfigError
-        if it cannot be run.
+        if the configuration cannot be run.
     """
     values = parse_value(str(dataset.attrs.get("config", "")), "config")
     if not isinstance(values, dict):

@@ -1,4 +1,4 @@
-"""Turns images and predictions into a labelled xarray dataset with CF-1.11 attributes."""
+"""Turns state rows and predictions into a labelled xarray dataset with CF-1.11 attributes."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _STATUSES = {
     status.DIVERGED: ("diverged", "diverged"),
     status.PARADOX: ("paradox", "met Painlevé's paradox"),
     status.TOPPLED: ("toppled", "toppled"),
-    status.IMPOSSIBLE: ("impossible", "no such body, or none that stands"),
+    status.IMPOSSIBLE: ("impossible", "impossible body, or one that cannot stand"),
 }
 STATUSES, STATUS_WORDS = ({code: each[k] for code, each in _STATUSES.items()} for k in (0, 1))
-"""How a trajectory ended: the flags of the variable `status`, and what figures call them."""
+"""How a trajectory ended: the flags of the variable `status`, and the labels that figures use for them."""
 
 
 class Reason(IntEnum):
-    """Whether there is a critical spin, n_c1 by the eigenvalues and n_c2 by simulation, and why not."""
+    """Whether a critical spin exists (n_c1 by the eigenvalues, n_c2 by simulation), and if not, why."""
 
     EXISTS = 0
     NO_FRICTION = 1
@@ -50,10 +50,10 @@ class Reason(IntEnum):
 
 
 REASONS = {int(reason): reason.name.lower() for reason in Reason}
-"""The flags of the variables that tell a `Reason`."""
+"""The flags of variables that hold a `Reason`."""
 
 ROWS = {CASE: "Row of the table of cases.", SAMPLE: "Number of the sample."}
-"""What the index along the rows of a table says."""
+"""The meaning of the index along the rows of a table."""
 
 
 def _flag(long_name: str, meanings: Mapping[int, str], description: str = "", **how: Any) -> Variable:
@@ -78,7 +78,7 @@ VARIABLES: dict[str, Variable] = {
     "spin_error": Variable("float64", SPIN, "estimated error of the final spin", of_sound_runs=True),
     "sensitive": _flag(
         "is the count sensitive?", {0: "firm", 1: "sensitive"},
-        "Whether other steps give another number of reversals.", of_sound_runs=True,
+        "Whether different steps give a different number of reversals.", of_sound_runs=True,
     ),
     "decided": _flag(
         "is the count certain?", {0: "open", 1: "decided"},
@@ -97,7 +97,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     "reversal_time_reason": _flag(
         "is the first reversal predicted?", reversal_time.REASONS,
-        "Whether there is a predicted time of the first reversal, and why not.",
+        "Whether the first reversal is predicted, and if not, why.",
     ),
     **{
         f"{name}_{side}{suffix}": _critical(name, side, source, by)
@@ -114,19 +114,19 @@ VARIABLES: dict[str, Variable] = {
     "form_factor": Variable("float64", NUMBER, "form factor L(f)", "Form factor L(f) of Takano (2011).", per_body=True),
     **{
         f"{name}_{side}_reason": _flag(
-            f"{name}{'⁺' if side == 'plus' else '⁻'}, whether found", REASONS,
-            f"Whether {source} give {name}_{side}, and why not.", per_body=True,
+            f"{name}{'⁺' if side == 'plus' else '⁻'}: outcome", REASONS,
+            f"Whether {source} give {name}_{side}, and if not, why.", per_body=True,
         )
         for name, source in (("n_c1", "eigenvalues"), ("n_c2", "simulations"))
         for side in _SIDES
     },
     "critical_reason": _flag("why a critical spin is missing", REASONS,
-                             "First of the four reasons that is not exists.", per_body=True),
+                             "First of the four reasons other than `exists`.", per_body=True),
 }  # fmt: skip
 
 
 def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
-    """The simulated variables, each of shape (cells,) or (cells, length), from images whose trajectories have ended."""
+    """Return the simulated variables from final state rows, of shape (cells,) or (cells, length)."""
     table = kernel.table(images)
     times = kernel.times(images, t_end)
     result = {"status": table["status"], "spin_final": kernel.spins(images), "t_stop": times, "step": table["step"]}
@@ -136,9 +136,9 @@ def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, A
 
 
 def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """A dataset of `arrays` over the cells of `grid`, or over its bodies where a variable is per body.
+    """Return a dataset of `arrays` over the cells of `grid`, or over its bodies where a variable is per body.
 
-    The cells may lie along one dimension, in C order, or along those of the grid.
+    The cells may lie along one dimension, in C order, or along the dimensions of the grid.
     """
     variables = {
         name: xr.Variable(
@@ -166,7 +166,7 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
 
 
 def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
-    """`dataset`, of samples, with the probability of each number of reversals."""
+    """Add to `dataset`, which holds samples, the probability of each number of reversals."""
     axes = [str(dim) for dim in dataset["status"].dims if dim != SAMPLE]
     found = probabilities(dataset)
     counts = np.arange(1, found["probability"].shape[-1] + 1)
@@ -186,26 +186,26 @@ def check_names(config: Config, series: Iterable[str] = ()) -> None:
 
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:
-    """Those of the variables `names` that extend over cells or bodies, each with the grid that it extends over."""
+    """Return the variables `names` that extend over cells or bodies, each with the grid that it extends over."""
     bodies = grid.of_bodies()
     return {name: (bodies if spec.per_body else grid, spec) for name, spec in VARIABLES.items() if name in names}
 
 
 def shaped(over: Grid, spec: Variable, values: Array) -> Array:
-    """`values` over the cells of `over`, converted to the dimensions and the type of the variable."""
+    """Return `values` over the cells of `over`, with the dimensions and type of the variable."""
     values = np.asarray(values).astype(spec.dtype, copy=False)
     return values.reshape(over.shape + (values.shape[-1:] if spec.along else ()))
 
 
 def pieces(grid: Grid, tile: tuple[slice, ...], arrays: Mapping[str, Array]) -> Iterator[tuple[str, Any, Array]]:
-    """For each variable in a tile's flat `arrays`: its name, its place in the whole array, and its values."""
+    """Yield for each variable in a tile's flat `arrays` its name, its place in the whole array, and its values."""
     at = dict(zip(grid.dims, tile, strict=True))
     for name, (over, spec) in layout(grid.part(tile), arrays).items():
         yield name, tuple(at[dim] for dim in over.dims), shaped(over, spec, arrays[name])
 
 
 def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, Array]]]) -> dict[str, Array]:
-    """Arrays over all cells or bodies, put together from those of the tiles."""
+    """Assemble the arrays over all cells or bodies from the tiles."""
     whole: dict[str, Array] = {}
     for tile, arrays in tiles:
         for name, (over, spec) in layout(grid, set(arrays) - set(whole)).items():
@@ -218,7 +218,7 @@ def assemble(grid: Grid, tiles: Iterable[tuple[tuple[slice, ...], Mapping[str, A
 def variables(
     specs: Mapping[str, Variable], dims: Sequence[str], found: Mapping[str, Array], system: str = PAPER_UNITS
 ) -> dict[str, xr.Variable]:
-    """Those variables of `specs` that are `found`, along common dimensions."""
+    """Return the variables of `specs` that `found` contains, along common dimensions."""
     return {
         name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype), described(spec, system))
         for name, spec in specs.items()
@@ -227,7 +227,7 @@ def variables(
 
 
 def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:
-    """The CF attributes of a variable in a system of units."""
+    """Return the CF attributes of a variable in a system of units."""
     words: dict[str, Any] = {**attributes(spec, system)}
     if spec.flags:
         words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)

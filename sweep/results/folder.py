@@ -26,10 +26,10 @@ class RunFiles:
             folder / f"{name}.{suffix}" for suffix in ("nc", "png", "yaml", "checkpoint")
         )
         self.earlier = self.checkpoint / "earlier.nc"
-        """The dataset of a smaller run, kept here until that of the larger one takes its place."""
+        """The dataset of a smaller run, kept here until the dataset of the larger run replaces it."""
 
     def pictures(self, variables: Sequence[str]) -> dict[Path, str | None]:
-        """The pictures of a run that names these variables, and what each shows; None for what the dataset is about."""
+        """Return the pictures of a run that names these variables, each with its variable, or None for the default."""
         further = {self.folder / f"{self.name}_{name}.png": name for name in variables[1:]}
         return {self.picture: variables[0] if variables else None, **further}
 
@@ -43,12 +43,12 @@ class RunFiles:
     def locked(self) -> Iterator[None]:
         """Keep other runs of this name out of the folder.
 
-        The operating system holds the lock, and lets go of it when the process ends, however it ends.
+        The operating system holds the lock and releases it when the process ends, for whatever reason.
 
         Raises
         ------
         StoreError
-            if another run is at work there, or nothing can be written.
+            if another run is using the folder, or nothing can be written.
         """
         self.require_writable()
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -63,7 +63,7 @@ class RunFiles:
             except BlockingIOError:
                 os.close(handle)
                 raise StoreError(
-                    f"{self.folder / self.name}: another run is at work there; wait for it, or choose another --output"
+                    f"{self.folder / self.name}: in use by another run; wait for it, or choose another --output"
                 ) from None
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), path.stat()):
@@ -78,7 +78,7 @@ class RunFiles:
             os.close(handle)
 
     def identity(self) -> Identity | None:
-        """The identity of the dataset that is there; None if there is none.
+        """Return the identity of the existing dataset; None if there is none.
 
         Raises
         ------
@@ -91,24 +91,24 @@ class RunFiles:
             return Identity(*(str(dataset.attrs.get(key, "")) for key in Identity.__dataclass_fields__))
 
     def opened(self, path: Path, *, load: bool = True) -> xr.Dataset:
-        """Open the dataset at `path`, which is one of these files; errors as of `open_dataset` say how to go on."""
+        """Open the dataset at `path`, one of these files; raises as `open_dataset`, with advice on how to go on."""
         try:
             return netcdf.open_dataset(path, load=load)
         except StoreError as error:
             raise StoreError(f"{error}; discard it with --fresh, or choose another --output") from None
 
     def keep_earlier(self) -> None:
-        """Keep the dataset that is there while the run that enlarges it goes on."""
+        """Keep the existing dataset while the run that enlarges it goes on."""
         self.checkpoint.mkdir(exist_ok=True)
         with replacing(self.earlier) as temporary:
             try:
                 os.link(self.dataset, temporary)
-            except OSError:  # a file system without links
+            except OSError:  # the file system has no links
                 shutil.copyfile(self.dataset, temporary)
 
     def discard(self) -> None:
-        """Remove all that an earlier run left."""
-        # The picture goes first: without its dataset it would pass for the next one's.
+        """Remove all files that an earlier run left."""
+        # Remove the picture first: without its dataset it would be taken for the next one's.
         for path in (self.picture, self.dataset):
             path.unlink(missing_ok=True)
         self.discard_checkpoint()

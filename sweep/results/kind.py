@@ -21,7 +21,7 @@ ATTRIBUTE = "sweep_kind"
 """The attribute of a dataset that names its kind."""
 
 OWN_BODY = "a model"
-"""What `model_brings` says of the model of a user that need not be of a rattleback."""
+"""Value of `model_brings` for a user-defined model that need not describe a rattleback."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,17 +29,17 @@ class Kind:
     """A kind of dataset."""
 
     name: str
-    """The command that makes it."""
+    """The command that creates it."""
     words: str
-    """What it is of."""
+    """What it contains."""
     marks: frozenset[str]
-    """Variables and dimensions by which a dataset that does not name its kind is known."""
+    """Variables and dimensions that identify a dataset without a recorded kind."""
     explored: bool = False
     """Whether the explorer shows it."""
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """The variables without which it cannot be shown, and dimensions that each must have."""
+    """Variables that are needed to show it, each with the dimensions that it must have."""
     attributes: tuple[str, ...] = ()
-    """The attributes without which it cannot be shown."""
+    """Attributes that are needed to show it."""
 
 
 def _over(dims: tuple[str, ...], *names: str) -> dict[str, tuple[str, ...]]:
@@ -74,25 +74,28 @@ INDICES = Kind(
     attributes=("title", "trajectories"),
 )  # fmt: skip
 RUN = Kind("run", "a run", frozenset(), explored=True)
-"""Its variables depend on what was measured.  Predictions count as a run, and so does a part of one."""
+"""Kinds whose variables depend on what was measured. Predictions and a part of a run count as a run."""
 
 _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
-"""Dimensions that have no values where nothing was found, and that not each dataset of a kind has."""
+"""Dimensions that may be empty where nothing was found, and that may be missing."""
 
 _CODES = ("status", "level", "curve", "outcome")
-"""Variables that mean nothing once they are averaged."""
+"""Variables that become meaningless once averaged."""
 
-_TEXTS = ("title", "config", "x", "y", "surface", "pictured", "undetermined", "model_parameters", "model_brings")
-"""Attributes that are texts, where there are any."""
+_TEXTS = (
+    "title", "config", "x", "y", "surface", "pictured", "undetermined", "verdict", "fits_because", "model_parameters",
+    "model_brings",
+)  # fmt: skip
+"""Optional attributes that are texts."""
 
-_NUMBERS = ("wall_time", "trajectories_per_second")
-"""Attributes that are numbers, where there are any."""
+_NUMBERS = ("wall_time", "trajectories_per_second", "fits")
+"""Optional attributes that are numbers."""
 
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
 
 
 def kind(dataset: xr.Dataset) -> Kind | None:
-    """Return the kind that a dataset names, or else that of its variables; None if another program wrote it."""
+    """Return the recorded kind of a dataset, or else the kind that its variables imply; None if neither is known."""
     if named := _KINDS.get(str(dataset.attrs.get(ATTRIBUTE))):
         return named
     there = {*dataset.variables, *dataset.dims}
@@ -102,7 +105,7 @@ def kind(dataset: xr.Dataset) -> Kind | None:
 
 
 def opened(path: Path, *, load: bool = True) -> xr.Dataset:
-    """Open a dataset as `open_dataset` does; `StoreError` also if it is of no kind, or lacks what its kind needs."""
+    """Open a dataset as `open_dataset`; raise a `StoreError` also if its kind is unknown or it is incomplete."""
     dataset = open_dataset(path, load=load)
     try:
         return require_whole(dataset, str(path))
@@ -112,14 +115,14 @@ def opened(path: Path, *, load: bool = True) -> xr.Dataset:
 
 
 def require_whole(dataset: xr.Dataset, name: str = "the dataset") -> xr.Dataset:
-    """Return a dataset that is of a kind and has what its kind needs; `StoreError` for any other."""
+    """Return a dataset if its kind is known and complete; raise a `StoreError` otherwise."""
     if found := fault(dataset):
         raise StoreError(f"{name}: {found}")
     return dataset
 
 
 def fault(dataset: xr.Dataset) -> str:
-    """Say why a dataset cannot be shown, such as one that has been averaged or cut since; "" if it can."""
+    """Say why a dataset cannot be shown, for example because it was averaged or cut; return "" if it can."""
     if (found := kind(dataset)) is None:
         return "not a dataset of sweep: no variable of it, such as status"
     if odd := _foreign(dataset):
@@ -133,7 +136,7 @@ def fault(dataset: xr.Dataset) -> str:
     lacks += [f"the axis {dim} of {name}" for name, dims in known.items() for dim in sorted(dims - there[name])]
     if lacks:
         more = f" and {counted(len(lacks) - 1, 'other thing')}" if len(lacks) > 1 else ""
-        return f"lacks {lacks[0]}{more}; it was cut or averaged: take the dataset that sweep wrote"
+        return f"lacks {lacks[0]}{more}; it was cut or averaged: use the dataset that sweep wrote"
     further = [str(dim) for name, dims in known.items() if dims for dim in there[name] - dims - _MAY_COME]
     averaged = [name for name in known if name in _CODES and dataset[name].dtype.kind not in "iu"]
     words = [*(f"the further axis {dim}; select one of its values" for dim in further),
@@ -142,7 +145,7 @@ def fault(dataset: xr.Dataset) -> str:
 
 
 def odd_axis(dataset: xr.Dataset, dims: Iterable[Hashable]) -> str:
-    """Say which of these dimensions has no values, or is stacked; "" if none."""
+    """Say which of these dimensions is empty or stacked; return "" if none is."""
     for dim in dims:
         if not dataset.sizes[dim]:
             return f"the axis {dim} has no values; select at least one"
@@ -152,7 +155,7 @@ def odd_axis(dataset: xr.Dataset, dims: Iterable[Hashable]) -> str:
 
 
 def _foreign(dataset: xr.Dataset) -> str:
-    """Say which attribute or variable of a known name is not as sweep writes it; "" if none."""
+    """Say which attribute or variable differs from what sweep writes; return "" if none does."""
     for name in _TEXTS:
         if not isinstance(dataset.attrs.get(name, ""), str):
             return f"the attribute {name} is not text"
@@ -171,7 +174,7 @@ def _foreign(dataset: xr.Dataset) -> str:
 
 
 def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:
-    """Return what a dataset of the kind that was found has to have, by what else it has."""
+    """Return what a dataset of this kind must have, given its other contents."""
     needs = {**found.needs}
     if found == BOUNDARIES:
         needs |= _over((), *(dataset.attrs[name] for name in ("x", "y") if name in dataset.attrs))
@@ -181,7 +184,7 @@ def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:
 
 
 def is_of_own_body(dataset: xr.Dataset) -> bool:
-    """Tell whether a user's model made it, which may be of anything."""
+    """Return whether the dataset comes from a user-defined model, which may describe anything."""
     return dataset.attrs.get("model_brings") == OWN_BODY
 
 

@@ -1,4 +1,4 @@
-"""Says where counts change between the cells of a grid, from their margins and without another trajectory."""
+"""Locates changes of the count between the cells of a grid from their margins, without further trajectories."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from sweep.variables import Variable
 
 FOUND, OPEN, UNCERTAIN = range(3)
 
-# Share of the margin to one reversal fewer from which on the margin to one more is this margin itself: the spin comes
-# no nearer to zero after its last arc, and so does not tell how far the next reversal is.  Of 576 cells of
-# configs/mu_b.yaml at n0 = 0.05, 250 are so.  One in twenty places of the drawn curves is off by 0.159 cells or more;
-# by 0.174 with 0.9 here, by 0.175 with 0.999, and by 0.213 if all margins are taken for distances.
+# If the margin to one reversal fewer is at least this share of the margin to one more, the two are the same: the spin
+# comes no nearer to zero after its last arc, so it does not show how far the next reversal is. This holds for 250 of
+# 576 cells of configs/mu_b.yaml at n0 = 0.05. One in twenty points of the drawn curves is off by 0.159 cells or more;
+# by 0.174 with 0.9 here, by 0.175 with 0.999, and by 0.213 if all margins are taken as distances.
 _NO_DIP = 0.98
 
-# Points of a curve that are nearer to each other than this, in lengths of the axes, are one.
+# Points of a curve that are closer together than this, as a fraction of the axis lengths, are merged.
 _SAME = 1e-9
 
 _PLACE = "Place along the bracket's axis of the simulated cell that reverses"
@@ -39,54 +39,55 @@ POINTS = {
     "reversals_more": Variable("int16", NUMBER, "spin reversals at end_more"),
     "outcome": Variable(
         "int8", NUMBER, "outcome of the search",
-        "Found if the bracket is as narrow as asked; open if a cell in it failed or met the time limit; uncertain if "
-        "the count of one of its ends is not decided.",
+        "Found if the bracket is as narrow as requested; open if a cell in it failed or met the time limit; uncertain "
+        "if the count of one of its ends is not decided.",
         {FOUND: "found", OPEN: "open", UNCERTAIN: "uncertain"},
     ),
 }  # fmt: skip
-"""The variables over the points of a dataset, beside `bracket`, the axis along which each bracket lies."""
+"""Variables over the points of a dataset, besides `bracket`, the axis along which each bracket lies."""
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Counts of cells and their margins, arrays of one shape."""
+    """Counts of cells and their margins, in arrays of one shape."""
 
     reversals: Array
     more: Array
-    """Margin to one reversal more, in spin; NaN where it is not known."""
+    """Margin to one reversal more, in spin; NaN where unknown."""
     fewer: Array
-    """The same to one fewer."""
+    """Margin to one reversal fewer."""
     known: Array
-    """Whether there is a count at all."""
+    """Whether the cell has a count at all."""
 
     @classmethod
     def of(cls, found: Mapping[str, Array]) -> Counts:
-        """Take them from the variables of a dataset."""
+        """Take counts and margins from the variables of a dataset."""
         known = np.isin(found["status"], (SETTLED, TIME_LIMIT))
         return cls(found["reversals"].astype(float), found["margin_more"], found["margin_fewer"], known)
 
     @cached_property
     def _below(self) -> Array:
-        """How much spin all counts below each take together, as far as the highest one is known to go.
+        """Return the range of spin taken by all counts below each count, up to the highest one.
 
-        A count takes the median of its cells.  One width for all is too coarse: at n0 = 0.05 in configs/mu_b.yaml the
-        counts from 2 on take 0.004, 0.015, 0.004, 0.010, 0.002 ... of spin, odd ones several times as much as even.
+        Each count takes the median of its cells. A single width for all counts would be too coarse: at n0 = 0.05 in
+        configs/mu_b.yaml the counts from 2 on take 0.004, 0.015, 0.004, 0.010, 0.002 ... of spin, odd ones several
+        times as much as even.
         """
         width, count = self.more + self.fewer, self._count
-        told = np.isfinite(width) & self.known & self._dips
-        widths = np.full(count.max(initial=0) + 1, np.median(width[told]) if told.any() else 0.0)
-        for k in np.unique(count[told]):
-            widths[k] = np.median(width[told & (count == k)])
+        usable = np.isfinite(width) & self.known & self._dips
+        widths = np.full(count.max(initial=0) + 1, np.median(width[usable]) if usable.any() else 0.0)
+        for k in np.unique(count[usable]):
+            widths[k] = np.median(width[usable & (count == k)])
         return np.concatenate([[0.0], np.cumsum(widths)])
 
     @cached_property
     def _dips(self) -> Array:
-        """Tell where the spin comes nearer to zero after its last arc, so that `more` is a distance."""
+        """Return where the spin comes nearer to zero after its last arc, so that `more` is a distance."""
         return np.asarray(~(self.more >= _NO_DIP * self.fewer))
 
     @cached_property
     def _to_more(self) -> Array:
-        """How far it is to one reversal more; a guess, by the other cells with this count, where there is no dip."""
+        """Return the distance to one reversal more, estimated from other cells with this count if there is no dip."""
         guess = np.diff(self._below)[self._count] - self.fewer
         return np.where(self._dips, self.more, np.maximum(self.more, guess))
 
@@ -95,12 +96,11 @@ class Counts:
         return np.where(self.known, self.reversals, 0).astype(int)
 
     def distance(self, level: Any, cells: Any = ...) -> Array:
-        """How far in spin `cells` (all of them, if not given) are from where `level` reversals begin: negative where
-        they count fewer.
+        """Return the distance in spin of `cells` (by default all) from the boundary of `level` reversals.
 
-        One level for all, or one for each.
-        NaN where that is not known.  For a cell whose count is farther away than by one, or whose spin comes no nearer
-        to zero after its last arc, it is a guess: as if each count took as much spin as in other cells.
+        It is negative where the cells count fewer, and NaN where unknown. There is one level for all cells, or one for
+        each. If the count of a cell is more than one away, or its spin comes no nearer to zero after its last arc, the
+        distance is an estimate that takes the width of each count from other cells.
         """
         count, below = self._count[cells], self._below
         of_level = np.interp(level, np.arange(below.size), below)
@@ -112,19 +112,19 @@ class Counts:
         return np.where(self.known[cells], found, np.nan)
 
     def borders(self, level: Any) -> Array:
-        """Tell whether the distance from where `level` reversals begin is the measured one, not a guess."""
+        """Return whether the distance from the boundary of `level` reversals is measured, and not estimated."""
         return np.asarray((self.reversals == level) | ((self.reversals == level - 1) & self._dips))
 
     def levels(self) -> range:
-        """The counts that begin somewhere between the cells."""
+        """Return the counts that begin somewhere between the cells."""
         found = self.reversals[self.known]
         return range(int(found.min()) + 1, int(found.max()) + 1) if found.size else range(0)
 
 
 def distinct(x: Array, y: Array, *, closed: bool) -> Array:
-    """Tell which points of a curve do not lie on the next one; parameters as of `smoothed`.
+    """Return a mask of the points of a curve that differ from the next one; parameters as for `smoothed`.
 
-    Points coincide where a cell of the grid lies on the boundary itself: they are found on several of its edges.
+    Points coincide where a cell of the grid lies exactly on the boundary: they are found on several of its edges.
     """
     apart = np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y) > _SAME
     apart[-1:] |= not closed
@@ -132,13 +132,13 @@ def distinct(x: Array, y: Array, *, closed: bool) -> Array:
 
 
 def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array, Array]:
-    """A smooth curve through points in order: cubic between two points, with the slopes of parabolas at them.
+    """Return a smooth curve through ordered points: piecewise cubic, with the slopes of parabolas at the points.
 
     Parameters
     ----------
-    x, y : in lengths of the axes, of `distinct` points, shape (points,)
+    x, y : `distinct` points as fractions of the axis lengths, shape (points,)
     closed : whether the curve goes on from the last point to the first
-    parts : straight lines that are drawn between two points
+    parts : number of straight segments drawn between two points
     """
     points = np.stack([x, y], axis=1)
     if len(points) < (3 if closed else 2):

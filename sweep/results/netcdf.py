@@ -1,8 +1,8 @@
-"""Datasets as netCDF4 files: written piece by piece, read whole or when asked for.
+"""Reads and writes datasets as netCDF4 files: written piece by piece, read whole or on demand.
 
-A dataset is one file that opens without this program, stored tile by tile.  It is written at the
-end of a run, from the tiles in the store: an HDF5 file that a killed process was writing can be lost
-as a whole, and a zarr folder written in place opens before it is complete.
+A dataset is one file that opens without this program, stored tile by tile. It is written at the end of a run, from the
+tiles in the store: an HDF5 file can be lost as a whole if the process writing it is killed, and a zarr folder written
+in place can be opened before it is complete.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ def write(
     sizes: Mapping[str, tuple[int, ...]] | None = None,
     pieces: Iterable[tuple[str, Any, Array]] = (),
 ) -> None:
-    """Write a dataset, of which some variables need not fit into memory.
+    """Write a dataset, some of whose variables may be larger than memory.
 
     Parameters
     ----------
-    sizes : shapes of the pieces in which variables are stored that are filled from `pieces`, by name
+    sizes : chunk shapes of the variables that are filled from `pieces`, by name
     pieces : name, place in the array, values
     """
     with replacing(path) as temporary:
@@ -47,7 +47,7 @@ def write(
                     target.setncatts(variable.attrs)
                 for name, place, values in pieces:
                     file[name][place] = values
-        except RuntimeError as error:  # netCDF's own, which does not say what the system said
+        except RuntimeError as error:  # netCDF's own error hides the system's
             probe(temporary)
             raise StoreError(f"{path}: cannot be written: {error}") from None
 
@@ -55,8 +55,8 @@ def write(
 def _write_frame(frame: xr.Dataset, path: Path) -> None:
     filled = {name for name, variable in frame.data_vars.items() if variable.dtype.kind == "f"}
     encoding = {name: {"_FillValue": None} for name in set(frame.variables) - filled}
-    # A Ctrl-C that came while xarray took its lock of HDF5 left that locked, and closing the file waited for it for
-    # ever (1 in 60 runs interrupted while they wrote their dataset).
+    # If Ctrl-C arrived while xarray took its HDF5 lock, the lock stayed locked and closing the file waited for ever (1
+    # in 60 runs interrupted while they wrote their dataset).
     with deferred():
         frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
@@ -70,7 +70,7 @@ def require_name(path: Path) -> None:
 
 
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
-    """Read a dataset, into memory or (`load=False`) when it is asked for; `StoreError` if it is not one."""
+    """Read a dataset into memory, or on demand with `load=False`; raise a `StoreError` if it is not one."""
     if not path.is_file():
         raise StoreError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     require_name(path)
@@ -84,9 +84,9 @@ def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
         return dataset
     except StoreError:
         raise
-    except Exception as error:  # what HDF5, netCDF and xarray raise for damaged files is documented nowhere
-        words = getattr(error, "strerror", None) or error
-        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {words}") from None
+    except Exception as error:  # the errors that HDF5, netCDF and xarray raise for damaged files are undocumented
+        reason = getattr(error, "strerror", None) or error
+        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {reason}") from None
 
 
 def _refuse_larger_than_memory(path: Path) -> None:

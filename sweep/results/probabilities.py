@@ -1,4 +1,4 @@
-"""Says from samples how probable each number of reversals is, and how exactly so many samples tell it."""
+"""Estimates the probability of each number of reversals from samples, with its sampling error."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ _END = "end of the 95 % interval of the probability, by Wilson's formula; it is 
 PROBABILITIES = {
     name: Variable("float64", NUMBER, long_name, description, along="count")
     for name, long_name, description in (
-        ("probability", "probability of so many spin reversals or more", ""),
+        ("probability", "probability of at least this many reversals", ""),
         ("probability_low", "probability, lower end of its 95 % interval", f"Lower {_END}"),
         ("probability_high", "probability, upper end of its 95 % interval", f"Upper {_END}"),
     )
 }
-"""The variables over the axes that samples have in common, and over counts from one on."""
+"""Variables over the axes shared by the samples, and over counts from one on."""
 
 _SIGMAS = 1.959963984540054
-"""Standard deviations of a normal distribution within which 95 % lie."""
+"""Number of standard deviations of a normal distribution that contain 95 %."""
 
 
 def probabilities(dataset: xr.Dataset) -> dict[str, Array]:
-    """Estimate the variables `PROBABILITIES` from those samples of a dataset that did not fail.
+    """Estimate the variables `PROBABILITIES` from the samples of a dataset that did not fail.
 
-    They are NaN where all samples failed.  There are as many counts as any of the samples has, but at least one.
+    They are NaN where all samples failed. Counts run up to the highest of any sample, and to at least one.
     """
     valid = sound(dataset).transpose(..., SAMPLE).values
     reversals = np.where(valid, dataset["reversals"].transpose(..., SAMPLE).values, 0)
@@ -42,12 +42,12 @@ def probabilities(dataset: xr.Dataset) -> dict[str, Array]:
 
 
 def sound(dataset: xr.Dataset) -> xr.DataArray:
-    """Tell which samples did not fail, over the dimensions of the status."""
+    """Return a mask of the samples that did not fail, over the dimensions of the status."""
     return ~dataset["status"].isin((*FAILURES, IMPOSSIBLE))
 
 
 def interval(share: Array, samples: Array) -> tuple[Array, Array]:
-    """The 95 % interval of a probability of which `samples` independent samples show the `share` (Wilson 1927)."""
+    """Return the 95 % interval of a probability, given the `share` among independent `samples` (Wilson 1927)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         z = _SIGMAS**2 / samples
         middle = (share + z / 2) / (1 + z)

@@ -1,4 +1,4 @@
-"""Where the numbers of a dataset come from: what they depend on, and what produced them."""
+"""Records the provenance of a dataset: what its numbers depend on, and what produced them."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from sweep.sources import hashed, versions
 _PACKAGE = Path(__file__).parent.parent
 
 _SHOWING = {"plots", "explorer", "cli", "report", "reproduce", "bench"}
-"""The rooms that only ask for numbers, or show them."""
+"""Packages that only request or show numbers."""
 
 
 def decisive_sources() -> list[Path]:
-    """The files on which the numbers of a dataset depend: all but those of the rooms that show them."""
+    """Return the source files on which the numbers of a dataset depend: all but those of packages that show them."""
     return [path for path in _PACKAGE.rglob("*.py") if path.relative_to(_PACKAGE).parts[0] not in _SHOWING]
 
 
 def identify(config: Config) -> Identity:
-    """The identity of what this program makes of `config`."""
+    """Return the identity of the results that this program computes for `config`."""
     return Identity(config.to_yaml(), config.fingerprint(), *sources())
 
 
 @cache
 def sources() -> tuple[str, str]:
-    """Hash of the decisive source files, and the versions of what compiles and runs them."""
+    """Return a hash of the decisive source files, with the versions of the libraries that compile and run them."""
     return hashed(decisive_sources())[:16], f"sweep {metadata.version('rattleback-sweep')}, {versions()}"
 
 
@@ -51,7 +51,8 @@ def this_cpu() -> str:
 def provenance(
     config: Config, seconds: float, cells: int, cpus: Iterable[str] = (), *, of: kind.Kind = kind.RUN
 ) -> dict[str, Any]:
-    """Attributes of a dataset: its kind, configuration, versions, types of CPU (by default this one's) and cost."""
+    """Return the attributes of a dataset: its kind, configuration, versions, CPU types (by default this one) and
+    cost."""
     return {
         kind.ATTRIBUTE: of.name,
         **vars(identify(config)),
@@ -74,7 +75,7 @@ def provenance(
 
 
 def _brought(config: Config) -> dict[str, str]:
-    """Of what a user brings: what it is, its file or entry point, the SHA-256 of that, and the model's parameters."""
+    """Describe a user-defined model or law: its kind, its file or entry point, its SHA-256, and its parameters."""
     if not (origin := config.origin):
         return {}
     return {
@@ -100,7 +101,7 @@ def _integrator_words(config: Config) -> str:
 
 @cache
 def _git_commit() -> str:
-    """The commit of the checkout from which the package runs; "unknown" for an installed package."""
+    """Return the git commit from which the package runs; "unknown" for an installed package."""
     root = _PACKAGE.parent
     if not (root / ".git").exists():
         return "unknown"

@@ -1,8 +1,9 @@
-"""A dataset in words: how its cells ended, how exact they are, what they cost."""
+"""Describes a dataset in words: how its cells ended, how accurate they are, and what they cost."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
@@ -17,17 +18,28 @@ from sweep.results.probabilities import PROBABILITIES
 
 
 def failed_fraction(dataset: xr.Dataset) -> float:
-    """Share of the cells whose simulation failed."""
+    """Return the fraction of cells whose simulation failed."""
     return float(dataset["status"].isin(FAILURES).mean())
 
 
 def describe(dataset: xr.Dataset) -> str:
-    """A few lines on the results of a dataset of any kind."""
+    """Summarise the results of a dataset of any kind in a few lines."""
     return "\n".join(_LINES.get(kind(dataset), _run)(dataset))
 
 
+def overview(dataset: xr.Dataset) -> str:
+    """Report the accuracy of a dataset, its variables by their axes, and its origin, all on one screen."""
+    over: dict[str, list[str]] = {}
+    for name, variable in dataset.data_vars.items():
+        over.setdefault(", ".join(map(str, variable.dims)) or "no axis", []).append(str(name))
+    lists = [f"over {axes}: {', '.join(names)}" for axes, names in over.items()]
+    origin = ", ".join(str(dataset.attrs[key]) for key in ("created", "versions") if key in dataset.attrs)
+    lines = [*accuracy(dataset), *lists, f"made {origin}" if origin else ""]
+    return "\n".join(fill(line, 100, subsequent_indent="  ") for line in lines if line)
+
+
 def contents(dataset: xr.Dataset) -> str:
-    """The variables, attributes and configuration of a dataset, a line each."""
+    """List the variables, attributes and configuration of a dataset, one per line."""
     variables = [
         f"  {name} ({', '.join(map(str, variable.dims))}): {variable.attrs.get('long_name', '')}"
         + (f", in {units}" if (units := variable.attrs.get("units")) else "")
@@ -38,28 +50,28 @@ def contents(dataset: xr.Dataset) -> str:
 
 
 def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
-    """How many points were found, and how exactly."""
+    """Summarise how many boundary points were found, and how accurately."""
     points, open_ = dataset.sizes["point"], int((dataset["outcome"] == OPEN).sum())
     curves, simulated = len(np.unique(dataset["curve"])), dataset.attrs["trajectories"]
     yield f"{counted(curves, 'curve')} with {counted(points, 'point')}, by {counted(simulated, 'simulation')}"
     one = dataset.isel(point=(dataset["outcome"] == FOUND).values)
     if found := one.sizes["point"]:
         width = np.abs(one["end_more"] - one["end_fewer"]) / np.maximum(abs(one["end_more"]), abs(one["end_fewer"]))
-        yield f"found {found}, within {float(width.max()):.1e} at most, relative to the place along the bracket"
+        yield f"found {found}, within a relative error of {float(width.max()):.1e} along the bracket"
     if open_:
         yield f"open {open_}: a cell near them failed, or did not end before the time limit"
     if off := int(dataset.attrs.get("middles_off", 0)):
-        yield f"lost {off}: the boundary was not found halfway between two points; one curve ends there, another begins"
+        yield f"lost {off}: the boundary was not found halfway between two points, so the curve is split there"
     if early := int(dataset.attrs.get("cells_not_final", 0)):
-        yield f"not final {early}: counts of cells of the grid that are lower bounds; a longer t_end makes them final"
+        yield f"not final {early}: counts of grid cells are lower bounds; a longer t_end makes them final"
     if pairs := int(dataset.attrs.get("pairs_not_searched", 0)):
         yield f"not searched {pairs}: pairs of neighbours whose counts differ, where a count is not final or missing"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
-        yield f"uncertain {uncertain}: the count of an end is not decided; it may be as near to the other as its error"
+        yield f"uncertain {uncertain}: the count at one end is not decided; its error may reach the other count"
 
 
 def _fit(dataset: xr.Dataset) -> Iterator[str]:
-    """The verdict, the values and their intervals, what the film does not determine, and how well the curve fits."""
+    """Report a fit: verdict, values and intervals, what the film does not determine, and how well the curve fits."""
     yield from verdict(dataset)
     if "law" in dataset.dims:
         yield from _laws(dataset)
@@ -79,19 +91,19 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def verdict(dataset: xr.Dataset) -> list[str]:
-    """The sentences on a fit, a line each; none for a fit of an earlier version."""
+    """Return the sentences on a fit, one per line; none for a fit of an earlier version."""
     return str(dataset.attrs.get("verdict", "")).splitlines()
 
 
 def bound(one: xr.Dataset) -> str:
-    """What a fit says of a parameter whose interval of 95 % reaches an end of the search; "" of any other."""
+    """Describe the bound of a parameter whose 95 % interval reaches an end of the search; return "" for any other."""
     ends = f"below {one['upper_95'].item():.5g}", f"above {one['lower_95'].item():.5g}"
     return ("", *(f"{end} at 95 %; no interval" for end in ends), "not determined by the film")[int(one.get("edge", 0))]
 
 
 def _indices(dataset: xr.Dataset) -> Iterator[str]:
-    """How much of the variance of each quantity comes from each parameter."""
-    yield f"shares of the variance, by {dataset.attrs['trajectories']} trajectories: alone, and with all that it shares"
+    """Report the share of each parameter in the variance of each quantity."""
+    yield f"shares of the variance, by {dataset.attrs['trajectories']} trajectories: alone, and including interactions"
     for quantity in dataset["quantity"].values:
         for name in dataset["parameter"].values:
             one = dataset.sel(quantity=quantity, parameter=name)
@@ -103,7 +115,7 @@ def _indices(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _laws(dataset: xr.Dataset) -> Iterator[str]:
-    """How well each law fits, the best first, its parameters, and what the film tells of the laws."""
+    """Report how well each law fits, best first, its parameters, and what the film says about the laws."""
     yield f"{'':14} {'chi square':>12} {'free':>5} {'Akaike':>12} {'weight':>9}   value and interval of 68 %"
     for law in dataset["law"].values[np.argsort(dataset["akaike"].values)]:
         one = dataset.sel(law=law).dropna("parameter", subset=["value"])
@@ -116,7 +128,7 @@ def _laws(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
-    """A line for each trajectory: how it ended, and its reversals."""
+    """Report how each trajectory ended, and its reversals, one per line."""
     most = 20
     yield f"{counted(dataset.sizes['trajectory'], 'trajectory', 'trajectories')}, sampled in time"
     for i in range(min(dataset.sizes["trajectory"], most)):
@@ -131,7 +143,7 @@ def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _critical(dataset: xr.Dataset) -> Iterator[str]:
-    """How many critical spins were found, and why the others were not."""
+    """Report how many critical spins were found, and why others are missing."""
     yield f"critical spins of {_count(dataset['critical_reason'], 'body', 'bodies')}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
@@ -146,27 +158,28 @@ def _critical(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _count(variable: xr.DataArray, *noun: str) -> str:
-    """How many values there are, and along which axes."""
+    """Describe the number of values, and the axes."""
     axes = " × ".join(f"{d} {n}" for d, n in variable.sizes.items())
     return f"{counted(variable.size, *noun)}{f' ({axes})' if axes else ''}"
 
 
 def _run(dataset: xr.Dataset) -> Iterator[str]:
-    """How cells ended, what they count, how exact they are, and what they cost."""
+    """Report how cells ended, their counts, their accuracy, and their cost."""
     if "status" not in dataset or dataset["status"].dtype.kind not in "iu":
         averaged = "status" in dataset
-        yield "no status of single cells: averaged" if averaged else "no status: predictions, or a part of a run"
+        yield "no status of individual cells: averaged" if averaged else "no status: predictions, or a part of a run"
         return
     status = np.ravel(dataset["status"].values)
     ends = ", ".join(f"{(status == code).sum()} {name}" for code, name in STATUSES.items() if code in status)
-    yield f"{_count(dataset['status'], 'cell')}: {ends or 'status unknown'}"
+    valid = np.isin(status, (SETTLED, TIME_LIMIT))
+    counts = f"; {_reversals(dataset, valid)}" if "reversals" in dataset and valid.any() else ""
+    yield f"{_count(dataset['status'], 'cell')}: {ends or 'status unknown'}{counts}"
+    if doubts := [*_doubts(dataset, valid)]:
+        yield "; ".join(doubts)
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "simulated_share" in dataset.attrs:
-        yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the others are inferred"
-    valid = np.isin(status, (SETTLED, TIME_LIMIT))
-    if "reversals" in dataset and valid.any():
-        yield _reversals(dataset, valid)
+        yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the rest are inferred"
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
     if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
@@ -174,26 +187,39 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         where = ", ".join(f"{name} = {least[name].item():g}" for name in dataset["misfit"].dims)
         bound, at = (" at least", f", at {where}") if where else ("", "")
         yield f"misfit: {least.item():.6g}{bound}, of {dataset.attrs.get('film_instants', '?')} instants{at}"
+
+
+def _doubts(dataset: xr.Dataset, valid: np.ndarray) -> Iterator[str]:
+    """Say which cells need a look."""
+    cells = counted(valid.size, "cell")
+    if "step_rule" in dataset and (missed := int((dataset["step_rule"] == MISSED).sum())):
+        verb = "misses" if missed == 1 else "miss"
+        error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
+        yield f"{missed} of {cells} {verb} the tolerance{error}"
+    if "decided" in dataset and (open_ := int((valid & (np.ravel(dataset["decided"].values) == 0)).sum())):
+        yield f"{counted(open_, 'count is', 'counts are')} uncertain"
+
+
+def accuracy(dataset: xr.Dataset) -> Iterator[str]:
+    """Report errors, steps and cost of a run."""
     for name, words in (("spin", ", as estimated"), ("energy", "")):
         error = dataset[f"{name}_error"].values if f"{name}_error" in dataset else np.empty(0)
         if np.isfinite(error).any():
             yield f"{name} error: median {np.nanmedian(error):.1e}, largest {np.nanmax(error):.1e}{words}"
-    if {"step", "step_rule"} <= {*dataset.data_vars} and (status != IMPOSSIBLE).any():
-        rule, step = (np.ravel(dataset[name].values)[status != IMPOSSIBLE] for name in ("step_rule", "step"))
-        found = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
-        missed = found.pop(STEP_RULES[MISSED], 0)
-        who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in found.items())
+    names = ("status", "step_rule", "step")
+    if {*names} <= {*dataset.data_vars} and (dataset["status"] != IMPOSSIBLE).any():
+        status, rule, step = (np.ravel(dataset[name].values) for name in names)
+        step, rule = step[status != IMPOSSIBLE], rule[(status != IMPOSSIBLE) & (rule != MISSED)]
+        rules = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
+        who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in rules.items())
         yield f"step: {step.min():.3g} to {step.max():.3g}{f', set by {who}' if who else ''}"
-        if missed:
-            verb = "misses" if missed == 1 else "miss"
-            yield f"tolerance: {missed} of {counted(status.size, 'cell')} {verb} the requested tolerance"
     if "wall_time" in dataset.attrs:
         rate = dataset.attrs.get("trajectories_per_second", np.nan)
         yield f"cost: {duration(dataset.attrs['wall_time'])}, {rate:.3g} trajectories/s"
 
 
 def _probabilities(dataset: xr.Dataset) -> Iterator[str]:
-    """How probable each number of reversals or more is."""
+    """Describe the probability of each number of reversals or more."""
     for count in dataset["count"].values:
         one = dataset.sel(count=count)
         share, low, high = (one[name].item() for name in PROBABILITIES)
@@ -201,17 +227,18 @@ def _probabilities(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _interval(value: float, low: float, high: float) -> str:
-    """A share with its interval of 95 %, where it is known."""
+    """Format a share with its 95 % interval, where it is known."""
     return f"{value:6.3f} ({low:.3f} to {high:.3f})" if np.isfinite(value) else "unknown"
 
 
 def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
-    counted = np.ravel(dataset["reversals"].values)[valid].astype(int)
-    line = f"reversals: {counted.min()} to {counted.max()}"
+    counts = np.ravel(dataset["reversals"].values)[valid].astype(int)
+    least, most = counts.min(), counts.max()
+    text = f"{f'{least} to ' if least < most else ''}{counted(most, 'reversal')}"
     if "reversals_predicted" not in dataset:
-        return line
-    off = abs(counted - np.ravel(dataset["reversals_predicted"].values)[valid])
-    return f"{line}; as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
+        return text
+    off = abs(counts - np.ravel(dataset["reversals_predicted"].values)[valid])
+    return f"{text}, as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
 
 
 _LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {

@@ -1,7 +1,7 @@
-"""How every file is written: whole or not at all.
+"""Writes every file completely or not at all.
 
-The bytes go to a temporary file in the same folder, are flushed to the disk, and the file is then
-renamed over the old one.  A file that has its final name is complete.
+The bytes go to a temporary file in the same folder, are flushed to disk, and the file is then renamed over the old one.
+A file with its final name is complete.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from tempfile import TemporaryFile
 from sweep.results.store import StoreError
 
 _PROBE = 1 << 22
-"""Bytes; more than HDF5 writes at once."""
+"""Buffer size in bytes, larger than any HDF5 write."""
 
 _BLOCK = 1 << 12
-"""Bytes for which a disk that is not full has room."""
+"""Number of bytes that fit unless the disk is full."""
 
 
 def require_writable(path: Path) -> None:
-    """Raise a `StoreError` if a file cannot be written, before anything is computed for it.
+    """Raise a `StoreError` before anything is computed if a file cannot be written.
 
-    A folder that is missing may be made later; nothing is left on the disk.
+    A missing folder may be created later; nothing is left on the disk.
     """
     if path.is_dir():
         raise StoreError(f"{path}: cannot be written: a folder")
@@ -38,7 +38,7 @@ def require_writable(path: Path) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path that becomes `path`, all at once, if the block succeeds.
+    """Yield a temporary path that is renamed to `path` if the block succeeds.
 
     Raises
     ------
@@ -56,14 +56,14 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
-        with suppress(OSError):  # a disk that is read-only says so even of a file that is not there
+        with suppress(OSError):  # a read-only disk raises this even for a file that does not exist
             temporary.unlink()
 
 
 def remove_unfinished(path: Path) -> None:
-    """Remove the temporary files that killed processes left of `path`."""
+    """Remove temporary files of `path` left by killed processes."""
     for left in path.parent.glob(f".{path.name}.*.part"):
-        if left.suffixes[-2][1:].isdigit():  # otherwise of another file, whose name only begins like this one's
+        if left.suffixes[-2][1:].isdigit():  # otherwise the file belongs to another whose name begins like this one
             left.unlink()
 
 

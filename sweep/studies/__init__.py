@@ -1,13 +1,13 @@
 """Studies of a model beyond maps of counts."""
 
 BOUNDARY_WIDTH = 1e-6
-"""Relative distance of the two simulated cells between which a count changes."""
+"""Default relative distance between the two simulated cells on either side of a boundary."""
 
 BOUNDARY_DEVIATION = 1e-2
-"""How far a boundary may be from the smooth curve in the middle between two points, relative to the axes' lengths."""
+"""Default largest distance of a boundary from the curve halfway between two points, relative to the axes' lengths."""
 
 SPIN_WIDTH = 1e-3
-"""Relative width down to which simulation brackets n_c2."""
+"""Default relative width of the brackets of n_c2."""
 
 WIDTHS, DEVIATIONS = (1e-12, 0.5), (1e-9, 1.0)
-"""The least and the largest width of brackets, and deviation of curves, that can be asked for."""
+"""Permitted ranges of the width of brackets and of the deviation of curves."""

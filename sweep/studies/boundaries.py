@@ -1,8 +1,9 @@
-"""The curves on which a count changes: cells of a grid tell where they pass, and simulations how exactly.
+"""Finds the curves on which a count changes: the grid locates them, and simulations refine them.
 
-On each edge of the grid whose ends count differently, the distance in spin from the boundary (`sweep.results.margins`)
-has a root.  The curves are followed from edge to edge, with brackets around roots no narrower than that needs.  Then
-all brackets are narrowed side by side, until two simulated cells on either side are as near as is asked.
+On each edge of the grid whose ends have different counts, the distance in spin from the boundary
+(`sweep.results.margins`) has a root. The curves are followed from edge to edge, with brackets around roots no narrower
+than necessary. Then all brackets are narrowed in parallel, until the simulated cells on either side are as close as
+requested.
 """
 
 from __future__ import annotations
@@ -26,37 +27,36 @@ from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies import DEVIATIONS, WIDTHS
 from sweep.studies.curve import Cell, Curve, Middle, Point
-from sweep.studies.kept import Task
 from sweep.studies.search import Search, measuring, require_between, require_certain
+from sweep.studies.study import Task
 
-# How far a place on an edge of the grid is from a whole index at most: that of rounding.  `_levelled` keeps places on
-# diagonals farther away.
+# Largest rounding error of a whole index along an edge of the grid. `_levelled` keeps points on diagonals farther away.
 _ON = 1e-9
 
 Asked = tuple[Curve, Point | Middle, float]
-"""A cell that is asked for: for which part of which curve, and its place along the line."""
+"""A requested cell: the part and curve that it belongs to, and its place along the line."""
 
 
 def boundaries(config: Config, x: str | None, y: str | None, width: float, deviation: float) -> Task:
-    """What `sweep.api.boundaries` asks for."""
+    """Arguments of `sweep.api.boundaries`."""
     require_between("bracket", width, WIDTHS)
     require_between("deviation", deviation, DEVIATIONS)
     across = chosen_axes(config, x, y)
-    words = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
+    message = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
     make = partial(Boundaries, across=across, width=width, deviation=deviation)
-    return Task(measuring(config), "boundaries", words, make)
+    return Task(measuring(config), "boundaries", message, make)
 
 
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
-    """The axes over which boundaries are curves: those named, or else the first two."""
+    """Return the axes over which boundaries are curves: the named ones, or else the first two."""
     require_certain(config)
     if COUNT not in config.equations.offers:
-        raise ConfigError([config.fault(("model",), "counts no reversals, so that there are no boundaries")])
+        raise ConfigError([config.fault(("model",), "does not count reversals, so it has no boundaries")])
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in long:
-            words = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
-            raise fault_of(words, option)
+            message = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
+            raise fault_of(message, option)
     rest = (name for name in long if name not in (x, y))
     up = y or next(rest, None)
     right = x or next(rest, None)
@@ -66,7 +66,7 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
 
 
 class Boundaries(Search):
-    """A search whose first round are the cells of the grid."""
+    """A search whose first round simulates the cells of the grid."""
 
     def __init__(self, config: Config, store: Store, across: tuple[str, str], width: float, deviation: float) -> None:
         super().__init__(config, store, width)
@@ -74,9 +74,9 @@ class Boundaries(Search):
         self.axes = {name: Axis(name, np.array(sorted(config.axes[name]))) for name in across}
         self.curves: list[Curve] = []
         self._grid = {"cells_not_final": 0, "pairs_not_searched": 0}
-        """What of the grid was not searched, as attributes of the dataset."""
+        """What was not searched on the grid, as attributes of the dataset."""
         self._asked: list[Asked] = []
-        """The cells that were asked for last."""
+        """The cells requested last."""
         self._asking = self._search()
 
     def ask(self) -> Mapping[str, Array]:
@@ -88,7 +88,7 @@ class Boundaries(Search):
         return {name: np.array([row[name] for row in rows]) for name in self.config.axes}
 
     def _search(self) -> Iterator[list[Asked]]:
-        """Follow the curves, and narrow all brackets, with the errors of their ends."""
+        """Follow the curves, then narrow all brackets, with error estimates at their ends."""
         self.tolerance = self.sharp(self.deviation)
         yield from iter(self._followed, [])
         self.tolerance, self.estimates = self.sharp(self.width), self.config.integrator.estimate_errors
@@ -124,9 +124,9 @@ class Boundaries(Search):
             each.learn(place, cell)
 
     def dataset(self) -> xr.Dataset:
-        """The points, with what their search has cost."""
+        """Return the dataset of the points, with the cost of the search."""
         columns = self._columns()
-        head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.told()
+        head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.attributes()
         middles = [middle for curve in self.curves for middle in curve.middles.values()]
         head |= {
             "deviation": self.deviation,
@@ -145,7 +145,7 @@ class Boundaries(Search):
         return xr.Dataset(own, {**places, **fixed}, {"Conventions": "CF-1.11", "title": title, **head})
 
     def _columns(self) -> dict[str, Array]:
-        """The variables and coordinates of all points, by name."""
+        """Return the variables and coordinates of all points, by name."""
         pieces = ((curve.level, *piece) for curve in self.curves for piece in curve.pieces())
         rows = [
             {"level": level, "curve": number, "closed": closed, **point.row()}
@@ -155,7 +155,7 @@ class Boundaries(Search):
         return {name: np.array([row[name] for row in rows]) for name in (*POINTS, "bracket", *self.config.axes)}
 
     def _curves(self, found: Counts) -> Iterator[Curve]:
-        """The curves of which the cells of the grid tell."""
+        """Return the curves located by the cells of the grid."""
         names, (x, y) = list(self.config.axes), self.across
         others = [name for name in names if name not in self.across]
         order = [names.index(name) for name in (*others, y, x)]
@@ -175,9 +175,9 @@ class Boundaries(Search):
                     yield Curve(level, closed, (self.axes[x], self.axes[y]), points)
 
     def _edge(self, known: tuple[Array, ...], at: tuple[float, float], others: dict[str, float]) -> Point:
-        """The point on the edge at `at`, in indices along x and y, one of which is whole.
+        """Return the point on the edge at `at`, in indices along x and y, one of which is whole.
 
-        `known` are distances, counts, and whether they are decided and measured, of shape (y, x).
+        `known` holds distances, counts, and masks of decided and measured cells, of shape (y, x).
         """
         x, y = self.across
         horizontal = abs(at[0] - round(at[0])) > abs(at[1] - round(at[1]))
@@ -194,12 +194,12 @@ def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:
 
 
 def _on_an_edge(at: tuple[float, float]) -> bool:
-    """Tell whether a place, in indices, lies between two neighbours, and not on a diagonal beside an unknown cell."""
+    """Return whether a place, in indices, lies between two neighbours and not on a diagonal by an unknown cell."""
     return min(abs(index - round(index)) for index in at) < _ON
 
 
 def _not_searched(counts: Counts) -> int:
-    """Pairs of neighbours that count differently, and that no contour separates: too little is known around them."""
+    """Count neighbouring pairs with different counts but no contour between them: too little is known around them."""
     found = 0
     for turned in (np.asarray, np.transpose):
         reversals, known = turned(counts.reversals), turned(counts.known)
@@ -215,6 +215,6 @@ def _not_searched(counts: Counts) -> int:
 
 
 def _levelled(distance: Array) -> Array:
-    """Numbers of the same signs, so much alike that a contour passes through the middle part of each edge."""
-    side = np.where(distance > 0, 1, -1)  # a cell may be on the boundary itself
+    """Return numbers with the same signs, similar enough that a contour passes through the middle part of each edge."""
+    side = np.where(distance > 0, 1, -1)  # a cell may lie exactly on the boundary
     return np.asarray(side * (2 + np.tanh(np.abs(distance) / np.nanmax(np.abs(distance), initial=1e-300))))

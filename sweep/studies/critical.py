@@ -1,4 +1,4 @@
-"""Critical spins: by the paper's formulas, by the model's eigenvalues, and n_c2 by simulation."""
+"""Finds critical spins by the paper's formulas, by the model's eigenvalues, and n_c2 by simulation."""
 
 from __future__ import annotations
 
@@ -21,34 +21,34 @@ from sweep.results.dataset import Reason
 from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies import WIDTHS
-from sweep.studies.kept import Task
 from sweep.studies.roots import Root
 from sweep.studies.search import Search, measuring, require_between, require_certain
+from sweep.studies.study import Task
 
 RATIO = 1.25
-"""From one spin of the way outwards to the next."""
+"""Ratio of successive spins in the outward search."""
 
-# Spins of the way outwards that are simulated at once.
+# Number of spins simulated at once in the outward search.
 _OUTWARDS = 5
 
-# The search ends at this multiple of n_c1.  The paper's n_c2 is 2 n_c1; over 200 bodies (a = 1.5 … 50, |δ| <= 0.5,
-# μ = 0.1 … 5000) it was found at up to 7.7 n_c1, with a median of 2.01.  Beyond, fast spins take long to simulate, and
+# The search ends at this multiple of n_c1. The paper's n_c2 is 2 n_c1; over 200 bodies (a = 1.5 … 50, |δ| <= 0.5, μ =
+# 0.1 … 5000) it was found at up to 7.7 n_c1, with a median of 2.01. Beyond that, fast spins take long to simulate, and
 # the body topples or leaves the plane instead: of 40 bodies searched up to a spin of 10, none reversed there.
 _FARTHEST = 8.0
 
 
 def critical(config: Config, width: float) -> Task:
-    """What `sweep.api.critical` asks for."""
+    """Arguments of `sweep.api.critical`."""
     require_between("bracket", width, WIDTHS)
     words = f"width of the brackets: {width!r}"
     return Task(searchable(config), "critical", words, partial(CriticalSpins, width=width))
 
 
 def searchable(config: Config) -> Config:
-    """`config` with a single start spin, since no critical spin depends on it; `ConfigError` if there is no search."""
+    """Return `config` with a single start spin, which has no influence; raise a `ConfigError` if it is unsuitable."""
     require_certain(config)
     if not config.of_rattlebacks:
-        raise ConfigError([config.fault(("model",), "no rattleback; critical spins are asked of: slip, noslip")])
+        raise ConfigError([config.fault(("model",), "not a rattleback; choose the model slip or noslip")])
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
         raise ConfigError([config.fault(("start", beyond[0]), "cannot be an axis of critical spins; give one number")])
     if "n0" not in config.tier.parameters:
@@ -62,41 +62,41 @@ def searchable(config: Config) -> Config:
 
 
 class Answer(NamedTuple):
-    """What a simulation says of a spin."""
+    """The outcome of a simulation at one spin."""
 
     place: float
     """The logarithm of |spin|."""
     distance: float
-    """How far in spin it is from n_c2: negative where it does not reverse, NaN where that is not known."""
+    """Distance in spin from n_c2: negative where the spin does not reverse, NaN where unknown."""
     measured: bool
-    """Whether the distance belongs to the one function that vanishes smoothly at n_c2."""
+    """Whether the distance lies on the branch that vanishes smoothly at n_c2."""
     failed: bool
 
 
 @dataclass
 class Spin:
-    """A search for n_c2 of one body, for spins of one sign, outwards from n_c1."""
+    """The search for n_c2 of one body and one sign of spin, outwards from n_c1."""
 
     body: int
     sign: float
     width: float
     left: list[float]
-    """The places of the way outwards that are still to be simulated."""
+    """Places of the outward search that remain to be simulated."""
     passed: list[Answer] = field(default_factory=list)
-    """What was found on the way outwards."""
+    """Outcomes of the outward search."""
     reverses: float = np.inf
-    """The nearest place that is known to reverse."""
+    """The nearest place known to reverse."""
     root: Root | None = None
-    """The bracket, once the way outwards has found one."""
+    """The bracket, once the outward search has found one."""
     reason: int | None = None
-    """What has come out; None as long as the search goes on."""
+    """The result; None while the search goes on."""
 
     def wanted(self) -> list[float]:
-        """The places to simulate next."""
+        """Return the places to simulate next."""
         return self.root.wanted() if self.root else self.left[:_OUTWARDS]
 
     def learn(self, answers: list[Answer]) -> None:
-        """Take in what simulations say of the places that were wanted."""
+        """Record the outcomes at the requested places."""
         self.reverses = min([self.reverses, *(each.place for each in answers if each.distance > 0)])
         if self.root:
             for each in answers:
@@ -110,7 +110,7 @@ class Spin:
             self.reason = Reason.EXISTS
 
     def _outwards(self, answers: list[Answer]) -> int | None:
-        """Go on until one reverses: then there is a bracket, or a reason why there is none."""
+        """Advance until a spin reverses; then set the bracket, or the reason why there is none."""
         for each in answers:
             if each.failed:
                 return Reason.FAILED
@@ -135,7 +135,7 @@ class Spin:
 
 
 class CriticalSpins(Search):
-    """A search for n_c2 of both signs of all bodies."""
+    """The search for n_c2 of both signs for all bodies."""
 
     def __init__(self, config: Config, store: Store, width: float) -> None:
         super().__init__(config, store, width)
@@ -165,7 +165,7 @@ class CriticalSpins(Search):
         counts, reversed_ = Counts.of(found), found["reversals"] > 0
         distance = counts.distance(1)
         measured = counts.borders(1) & ~np.isnan(distance)
-        # A trajectory that fails after a reversal has reversed, but has no arc that could be measured.
+        # A trajectory that fails after a reversal has reversed, but its last arc cannot be measured.
         size = np.exp([place for _, places in self._asked for place in places])
         distance = np.where(reversed_ & ~(distance > 0), size, distance)
         failed = ~counts.known & ~reversed_
@@ -174,7 +174,7 @@ class CriticalSpins(Search):
             spin.learn([Answer(place, *next(answers)) for place in places])
 
     def dataset(self) -> xr.Dataset:
-        """Critical spins by formulas, eigenvalues and simulation, with what the search has cost."""
+        """Return the critical spins by formulas, eigenvalues and simulation, with the cost of the search."""
         second, inner, outer = self.first.copy(), *np.full((2, *self.first.shape), np.nan)
         for spin in self.spins:
             at = (int(spin.sign < 0), spin.body)
@@ -192,18 +192,19 @@ class CriticalSpins(Search):
         four = np.concatenate([self.first, second])
         arrays["critical_reason"] = four[(four != Reason.EXISTS).argmax(axis=0), np.arange(self.grid.size)]
         title = f"{self.config.name}: critical spins ({self.config.model} model)"
-        return dataset.label(self.config, self.grid, arrays, {"title": title, **self.told()}).drop_vars("n0")
+        return dataset.label(self.config, self.grid, arrays, {"title": title, **self.attributes()}).drop_vars("n0")
 
 
 def _way(n_c1: float, limit: float) -> list[float]:
-    """The places of the way outwards from n_c1."""
+    """Return the places of the outward search from n_c1."""
     farthest = min(_FARTHEST * n_c1, limit)
     steps = int(np.ceil(np.log(farthest / n_c1) / np.log(RATIO)))
     return [float(np.log(min(n_c1 * RATIO**i, farthest))) for i in range(steps + 1)]
 
 
 def _reasons_of_n_c1(config: Config, columns: Columns, prediction: Prediction) -> Array:
-    """Why the eigenvalues have no n_c1, or that it exists: n_c1+ and n_c1- of all bodies, shape (2, bodies)."""
+    """Return why the eigenvalues give no n_c1, or that it exists, for n_c1+ and n_c1- of all bodies, shape (2,
+    bodies)."""
     by_formula, linear = prediction.variables.get("n_c1_plus"), prediction.n_c1
     unresisted = np.isnan(linear) | (columns["mu"] <= 0 if by_formula is not None else False)
     never = np.isinf(linear)

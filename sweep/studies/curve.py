@@ -1,7 +1,7 @@
-"""A curve on which a count changes: points between simulated cells, and the look at the middle between two of them.
+"""Refines a curve on which a count changes: points between simulated cells, checked halfway between each pair.
 
-Where the smooth curve through the points passes between two simulated cells that count as it says, it is confirmed
-there.  Where it does not, a point is found beside it, and the halves are looked at in their turn.
+If the smooth curve through the points passes between two simulated cells whose counts agree with it, it is confirmed
+there. Otherwise a new point is found nearby, and the two halves are checked in turn.
 """
 
 from __future__ import annotations
@@ -19,57 +19,57 @@ from sweep.grid import Array
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN, distinct, smoothed
 from sweep.studies.roots import Root
 
-# How much farther from an expected place the next two cells are, where the last two lie on one side of the curve.
+# Factor by which the next two cells move away from an expected place if the last two lie on the same side of the curve.
 _FARTHER = 8.0
 
-# Width of the brackets between which a curve is followed, at most, relative to the axis.
+# Largest width of the brackets between which a curve is followed, relative to the axis.
 _COARSE = 1e-3
 
-# A part of a curve that is longer than the next one by this factor gets a point in its middle all the same: beside a
-# peak a smooth curve may pass a single place by chance.
+# A part of a curve that is longer than the next one by this factor always gets a point in its middle: next to a peak, a
+# smooth curve may agree with a single place by chance.
 _UNEVEN = 4.0
 
 
 class Cell(NamedTuple):
-    """What is known of a cell beside a curve."""
+    """What is known of a cell near a curve."""
 
     distance: float
-    """From the boundary, in spin; NaN where there is no count."""
+    """Distance from the boundary, in spin; NaN if there is no count."""
     reversals: int
     decided: bool
-    """Whether the count is certain, or its error is not known."""
+    """Whether the count is certain, or its error is unknown."""
     measured: bool
-    """Whether the distance is the measured one, not a guess."""
+    """Whether the distance is measured, and not estimated."""
 
 
 @dataclass
 class Line:
-    """A line along one axis that crosses a curve, and what is known on it."""
+    """A line along one axis that crosses a curve, and what is known along it."""
 
     along: Axis
     cell: dict[str, float]
     """The other parameters."""
     cells: dict[float, Cell]
-    """What is known along the line, by place; places are straight (`Axis.straight`)."""
+    """Known cells along the line, by place; places are straightened (`Axis.straight`)."""
 
     def parameters(self, place: float) -> dict[str, float]:
-        """All parameters of the cell at a place."""
+        """Return all parameters of the cell at a place."""
         return {**self.cell, self.along.name: float(self.along.bent(np.array(place)))}
 
 
 @dataclass
 class Point(Line):
-    """A place of a curve that is being narrowed."""
+    """A point of a curve whose bracket is being narrowed."""
 
     root: Root
     halvings: int = 0
-    """How often the way between two points of the grid was halved before this one was found."""
+    """Number of times the interval between two grid points was halved before this point was found."""
 
     @classmethod
     def between(
         cls, along: Axis, cell: dict[str, float], cells: dict[float, Cell], ends: Sequence[float], deviation: float
     ) -> Point:
-        """A point between two cells on either side of a curve, good enough to follow it within `deviation`."""
+        """Return a point between two cells on either side of a curve, good enough to follow it within `deviation`."""
         values = {place: cell.distance for place, cell in cells.items()}
         smooth = {place: values[place] for place, cell in cells.items() if cell.measured}
         width = min(deviation / 2, _COARSE) * float(np.ptp(along.straight(along.values)))
@@ -93,7 +93,7 @@ class Point(Line):
         self.cells[place] = cell
 
     def row(self) -> dict[str, Any]:
-        """What a dataset tells of it (`sweep.results.margins.POINTS`)."""
+        """Return the variables of the point in a dataset (`sweep.results.margins.POINTS`)."""
         root = self.root
         ends = sorted((root.low, root.high), key=lambda place: root.values[place])
         cells = [self.cells[place] for place in ends]
@@ -108,40 +108,40 @@ class Point(Line):
 
 
 def _within(axis: Axis, places: Any) -> Array:
-    """The nearest places on the axis: what lies beyond it was not asked for, and may be no body."""
+    """Return the nearest places on the axis; anything beyond was not requested, and may be an impossible body."""
     return np.asarray(np.clip(places, *axis.straight(axis.values)[[0, -1]]))
 
 
 def _most_halvings(deviation: float) -> float:
-    """How often the way between two points is halved: as often as leads from an axis' length to the deviation.
+    """Return how often the interval between two points is halved: from the axis length down to the deviation.
 
-    Where two parts of a curve are near each other, points are found now on one and now on the other, without end.
+    Without a limit, two nearby parts of a curve would keep attracting new points in turn.
     """
     return -float(np.log2(deviation))
 
 
 def _beside(axis: Axis, at: float, off: float) -> tuple[float, float]:
-    """The places on both sides of one."""
+    """Return the places on both sides of one."""
     inner, outer = _within(axis, [at - off, at + off]).tolist()
     return inner, outer
 
 
 @dataclass
 class Middle(Line):
-    """A place between two points at which the curve is expected: two cells beside it tell whether it is there.
+    """A place between two points where the curve is expected; two cells on either side check whether it is there.
 
-    If not, it is looked for between the points, where it crosses the line if it goes straight from one to the other.
-    Then it is looked for ever farther away: peaks that resonances make are narrow and high.
+    If it is not, the search moves to the crossing of the straight line between the points, and then farther and farther
+    away: peaks caused by resonances are narrow and high.
     """
 
     at: float
     beside: tuple[float, float]
-    """The places of the two cells that are asked for."""
+    """The places of the two requested cells."""
     between: tuple[float, float]
-    """The places of the two points, as far as they lie along the line."""
+    """The places of the two points, if they lie along the line."""
     halvings: int = 0
     confirmed: bool | None = None
-    """Whether the curve passes between the first two cells; None while that is open."""
+    """Whether the curve passes between the first two cells; None while unknown."""
 
     def wanted(self) -> list[float]:
         return [] if self.confirmed is not None else [place for place in self.beside if place not in self.cells]
@@ -150,7 +150,7 @@ class Middle(Line):
         self.cells[place] = cell
 
     def settled(self, deviation: float) -> Middle | Point:
-        """What it is after the last cells: itself, confirmed or not, or a point on a line."""
+        """Return what follows from the last cells: the place itself, confirmed or not, or a point on a line."""
         if self.confirmed is not None or not self.cells:
             return self
         more = {place: cell.distance > 0 for place, cell in self.cells.items()}
@@ -170,11 +170,11 @@ class Middle(Line):
         return self
 
     def point(self, ends: Sequence[float], deviation: float) -> Point:
-        """A point between two of its cells, on either side of the curve."""
+        """Return a point between two of the cells, on either side of the curve."""
         return replace(Point.between(self.along, self.cell, self.cells, ends, deviation), halvings=self.halvings)
 
     def _look_farther(self) -> None:
-        """Choose the next two cells: those of the two points, or farther by a factor, as far as the axis goes."""
+        """Choose the next two cells: those of the two points, or farther away by a factor, within the axis."""
         inner, outer = self.beside
         if self.between[0] < inner or outer < self.between[1]:
             inner, outer = min(inner, self.between[0]), max(outer, self.between[1])
@@ -187,14 +187,14 @@ class Middle(Line):
 
 @dataclass
 class Curve:
-    """Points in order, and the middles that are or were looked at."""
+    """The ordered points, and the middles between them that are or were checked."""
 
     level: int
     closed: bool
     across: tuple[Axis, Axis]
     points: list[Point]
     middles: dict[int, Middle] = field(default_factory=dict)
-    """By the `id` of the point before each."""
+    """Middles by the `id` of the point before each."""
 
     @cached_property
     def spans(self) -> Array:
@@ -204,7 +204,7 @@ class Curve:
         return [*self.points, *self.middles.values()]
 
     def grow(self, deviation: float) -> None:
-        """Take in the middles of which new cells are known, and look at those between points that have been found."""
+        """Record the middles whose new cells are known, and check those between newly found points."""
         settled = {before: middle.settled(deviation) for before, middle in self.middles.items()}
         self._insert({before: point for before, point in settled.items() if isinstance(point, Point)})
         found, places = self._found()
@@ -222,7 +222,7 @@ class Curve:
         for i in np.flatnonzero(long > _FARTHER * deviation).tolist():
             this, following = found[i], found[(i + 1) % len(found)]
             if after_it[id(this)] is not following:
-                continue  # a point between them is being looked for
+                continue  # a point between them is still being searched
             if (middle := self.middles.get(id(this))) is None:
                 middle = self._middle(this, expected[i], (places[i], after[i]), deviation)
                 self.middles[id(this)] = replace(middle, halvings=1 + max(this.halvings, following.halvings))
@@ -231,7 +231,7 @@ class Curve:
         self._insert(new)
 
     def pieces(self) -> list[tuple[list[Point], bool]]:
-        """The points between which it could be followed, piece by piece, and whether a piece is closed."""
+        """Return the points through which the curve could be followed, in pieces, and whether each piece is closed."""
         middles = [self.middles.get(id(point)) for point in self.points]
         ends = [i for i, middle in enumerate(middles, start=1) if middle and not middle.confirmed]
         if not ends:
@@ -242,14 +242,14 @@ class Curve:
         return [(points[start:end], False) for start, end in pairwise(cuts)]
 
     def _insert(self, after: dict[int, Point]) -> None:
-        """Put points behind those with these ids, in place of the middles there."""
+        """Insert points after those with these ids, replacing the middles there."""
         self.points = [each for point in self.points for each in (point, after.get(id(point))) if each is not None]
         self.middles = {before: middle for before, middle in self.middles.items() if before not in after}
 
     def _found(self) -> tuple[list[Point], Array]:
-        """The points that have been found, of those at one place the last, and their places, shape (points, 2).
+        """Return the points found so far (the last of those at one place) and their places, shape (points, 2).
 
-        Places are in lengths of the axes.
+        Places are fractions of the axis lengths.
         """
         found = [point for point in self.points if point.found]
         places = np.array([self._place(point) for point in found]).reshape(-1, 2)
@@ -261,7 +261,7 @@ class Curve:
         return np.array([axis.straight(np.array(middle[axis.name])) for axis in self.across]) / self.spans
 
     def _middle(self, before: Point, expected: Array, ends: tuple[Array, Array], deviation: float) -> Middle:
-        """A middle on a line across the way between two ends, by their places in lengths of the axes."""
+        """Return a middle on a line across the segment between two ends, given as fractions of the axis lengths."""
         way = np.abs(ends[1] - ends[0])
         across = int(way[0] > way[1])
         along, other = self.across[across], self.across[1 - across]

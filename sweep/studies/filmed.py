@@ -15,25 +15,25 @@ from sweep.results.kind import FIT, kind, opened
 from sweep.studies.trajectory import trajectory
 
 _AT_REST = ("roll_angle", "pitch_angle", "table_x", "table_y")
-"""What a film does not show."""
+"""Series that a film does not have."""
 
 
 def shown(source: xr.Dataset | str | Path, reporter: Reporter | None = None) -> xr.Dataset:
-    """The trajectories of a dataset; of a fit the film, as a body that stays upright, and the body that fits it.
+    """Return the trajectories of a dataset; for a fit, the film, as a body that stays upright, and the fitted body.
 
     Raises
     ------
     StoreError
         if the file is not a dataset.
     ConfigError
-        if the fit cannot be followed, or is of a model of the user.
+        if the fit cannot be followed, or used a user-defined model.
     """
     found = source if isinstance(source, xr.Dataset) else opened(Path(source))
     return _beside(found, reporter) if kind(found) is FIT else found
 
 
 def _beside(found: xr.Dataset, reporter: Reporter | None) -> xr.Dataset:
-    """The film and the fit, the trajectory of which begins as much earlier as the delay says."""
+    """Return the film and the fit; the fitted trajectory begins earlier by the delay."""
     config, time = configuration(found), found["time"].values
     parameters = found["parameter"].values.tolist() if "law" not in found.dims else []
     delay = found["value"].sel(parameter="film_delay").item() if "film_delay" in parameters else 0.0

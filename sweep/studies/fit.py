@@ -1,8 +1,8 @@
 """Finds the body, friction and start that reproduce a film.
 
-The misfit has many minima: a trajectory that reverses once more is another one.  So the search starts from points all
-over the ranges (Sobol), and first asks for the beginning of the film, then for half as much again, and so on.  Where
-the curve that is found does not fit, the search begins again from more points.
+The misfit has many minima: a trajectory with one more reversal is a different minimum. The search therefore starts from
+points all over the ranges (Sobol), and fits the beginning of the film first, then half as much again, and so on. If the
+curve that it finds does not fit, the search is repeated from more points.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from sweep.results import dataset
 from sweep.results.kind import FIT
 from sweep.results.provenance import provenance
 from sweep.studies import ranges, verdict
+from sweep.studies.concurrent import run_concurrently
 from sweep.studies.intervals import LEVELS, blind, covariance, intervals, variance
 from sweep.studies.misfit import ENOUGH, UNKNOWNS, Minimum, Problem, minimise
 from sweep.studies.search import require_simulated
-from sweep.studies.together import together
 from sweep.units import ANGLE, SPIN, TIME
 from sweep.variables import Variable
 
@@ -45,33 +45,34 @@ _SEEN = {
 }
 
 SEARCHES = ((256, 6), (1024, 8))
-"""Points all over the ranges, and the best of them from which a search goes on; more if the first finds no fit."""
+"""Numbers of points all over the ranges and of best points to continue from; more if the first search finds no fit."""
 
-# Minima whose parameters differ by less than this share of their ranges are one.
+# Minima whose parameters differ by less than this share of their ranges are merged.
 _SAME = 0.01
 
-# The search sees so much more of the film each time, and begins with its first twelfth.  Three films of turning bodies
-# that were fitted from one reversal to the next were missed; doubling missed two, and 1.3 was no better than 1.5.
+# Factor by which the part of the film that the search sees grows each time, beginning with its first twelfth. Of the
+# films of turning bodies that were fitted from one reversal to the next, three were missed; doubling missed two, and
+# 1.3 was no better than 1.5.
 _LONGER, _HORIZONS = 1.5, 7
 
-# How exact the minima are over a part of the film.
+# Accuracy of minima over a part of the film.
 _ROUGHLY = 1e-5
 
-# How often outliers are looked for and ranges are widened: where the misfit would fall by half a variance within
-# another tenth of the range.
+# Number of times outliers are sought and ranges widened: where the misfit would fall by half a variance within another
+# tenth of the range.
 _ROUNDS, _WIDENED = 4, (0.1, 0.5)
 
 _OPTIONAL = ("sigma",)
-"""Parameters that every law has, and that are zero where a configuration does not name them."""
+"""Parameters that every law has, and that are zero unless a configuration names them."""
 
-_RUGGED = "the misfit is rugged: minima lie close together, and the intervals are of one of them alone"
+_RUGGED = "the misfit is rugged: minima lie close together, and the intervals belong to only one of them"
 
 
 @deferred()
 def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], None]) -> xr.Dataset:
-    """The fit of the law of friction that `config` names."""
+    """Fit the law of friction that `config` names."""
     if not np.isfinite([film.time, film.value, film.errors]).all():
-        raise fault_of("the film holds a value that is no number; leave out such instants")
+        raise fault_of("the film holds a value that is not a number; leave out that instant")
     theirs, known = ranges.of_film(film), config.distributions
     config = _one_body(config, free, theirs)
     if reason := unlike(config, film):
@@ -80,7 +81,7 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
     if film.omitted:
         note(film.omitted)
     if known:
-        note(f"free within what was measured: {', '.join(known)}")
+        note(f"free within the measured distribution: {', '.join(known)}")
     sought = {
         name: theirs.get(name) or (ranges.measured(config.table[name], known[name]) if name in known
                                    else ranges.of_parameter(config, film, name))
@@ -90,7 +91,7 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
         raise fault_of(f"{len(sought)} parameters are free, and the film has {len(film.time)} rows; free fewer")
     ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
-        raise ConfigError([config.fault(("start", "x0"), f"what is free reaches too far: {off}")])
+        raise ConfigError([config.fault(("start", "x0"), f"the range of a free parameter is too wide: {off}")])
     with blamed(config.origin):
         problem, minima = _found(Problem(config, film, sought, _countable(film)), note)
         best, limits, rugged = intervals(problem, minima[0], note)
@@ -99,47 +100,48 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
 
 
 def with_optional(config: Config, free: Sequence[str]) -> Config:
-    """`config` with zero for what is free of the couples that any law may have besides, such as `sigma`."""
+    """Return `config` with zero for the free couples that any law may have in addition, such as `sigma`."""
     named = {*config.parameters, *config.cases}
     zero = {name: Values.one(0.0) for name in free if name in _OPTIONAL and name not in named}
     return replace(config, parameters=config.parameters | zero) if zero and config.of_rattlebacks else config
 
 
 def _countable(film: Film) -> Array:
-    """Which instants count before anything is known."""
+    """Return the instants that count before anything is known."""
     return np.ones(len(film.time), bool) if film.what == "heading" else verdict.gross(film.value)
 
 
 def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> Config:
-    """`config` if it describes one body, apart from the `free` parameters; `ConfigError` if not.
+    """Return `config` if it describes one body, apart from the `free` parameters; raise a `ConfigError` otherwise.
 
-    `of_film` are the names of what may be free of the film.
+    `of_film` holds the names of the free parameters of the film itself.
     """
     require_simulated(config)
     config = config.at_medians
     known = (*config.tier.parameters, *of_film)
     if not free:
-        raise fault_of(f"name the free parameters, out of {', '.join(known)}")
+        raise fault_of(f"name at least one free parameter, out of {', '.join(known)}")
     for name in free:
         if name not in known and (words := ended(name)):
             raise fault_of(words, name)
         if name not in known:
-            message = f"{brief(name)} is no parameter of the {config.tier.name} model{suggestion(name, known)}"
-            raise fault_of(f"{message}; free may be {', '.join(known)}")
+            message = f"{brief(name)} is not a parameter of the {config.tier.name} model{suggestion(name, known)}"
+            raise fault_of(f"{message}; these can be free: {', '.join(known)}")
     if config.cases:
-        raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit is of one body")])
+        raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit takes a single body")])
     if more := [name for name in config.axes if name not in free]:
-        raise ConfigError([config.fault(config.table[more[0]].place, "has several values; free it, or give one")])
+        place = config.table[more[0]].place
+        raise ConfigError([config.fault(place, "has several values; make it free, or give one value")])
     return config
 
 
 def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list[Minimum]]:
-    """The minima over the whole film, the lowest first, and the problem with the ranges and outliers that they show."""
+    """Return the minima over the whole film, lowest first, and the problem with the final ranges and outliers."""
     found: list[tuple[Problem, list[Minimum]]] = []
     for seed, (points, kept) in enumerate(SEARCHES):
         settled, minima = _settled(problem, _search(problem, points, kept, seed, note), note)
         found.append((settled, minima))
-        # A wider range may have led into a corner far from the minimum that is sought.
+        # A wider range may have led into a corner far from the minimum.
         if settled.free == problem.free and verdict.judged(settled, minima[0]).fits:
             break
     problem, minima = min(found, key=lambda each: each[1][0].misfit)
@@ -147,7 +149,7 @@ def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list
 
 
 def _turned(problem: Problem, minimum: Minimum) -> Minimum:
-    """The minimum with the sign of the start that the configuration has, where half a turn changes it."""
+    """Return the minimum with the same sign of the start as the configuration, where half a turn changes the sign."""
     names = ranges.mirrored(problem.config, problem.free)
     if not names:
         return minimum
@@ -160,7 +162,7 @@ def _turned(problem: Problem, minimum: Minimum) -> Minimum:
 
 
 def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:
-    """Minima over the whole film, the lowest first."""
+    """Return minima over the whole film, lowest first."""
     sobol = qmc.Sobol(len(problem.free), rng=seed).random(points)
     rows = len(problem.film.time)
     horizons = [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
@@ -176,15 +178,15 @@ def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[
 def _minimised(
     problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = ENOUGH
 ) -> list[Minimum]:
-    """The minima near these places, the lowest first, over the film or its first instants."""
+    """Return the minima near these places, lowest first, over the film or its first instants."""
     answers = partial(problem.answers, instants=instants)
-    return _different(together([partial(minimise, place=place, enough=enough) for place in places], answers))
+    return _different(run_concurrently([partial(minimise, place=place, enough=enough) for place in places], answers))
 
 
 def _settled(
     problem: Problem, minima: list[Minimum], note: Callable[[str], None]
 ) -> tuple[Problem, list[Minimum]]:  # fmt: skip
-    """The minima once outliers are left out, and ranges widened at whose ends the best one lies."""
+    """Return the minima after leaving out outliers and widening ranges at whose ends the best minimum lies."""
     for _ in range(_ROUNDS):
         best = minima[0]
         kept = verdict.outliers(problem, best)
@@ -204,7 +206,7 @@ def _settled(
 
 
 def _different(minima: list[Minimum]) -> list[Minimum]:
-    """The minima that differ, the lowest first."""
+    """Return the distinct minima, lowest first."""
     found: list[Minimum] = []
     for each in sorted(minima, key=lambda each: each.misfit):
         if all(np.max(np.abs(each.place - other.place)) > _SAME for other in found):
@@ -213,13 +215,13 @@ def _different(minima: list[Minimum]) -> list[Minimum]:
 
 
 def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float) -> xr.Dataset:
-    """What was found, with the film and the curve that fits it."""
+    """Return the dataset of the result, with the film and the fitted curve."""
     best, film, names = minima[0], problem.film, list(problem.free)
     spread, unit = covariance(problem, best), variance(problem, best)
     deviation, rows = np.sqrt(np.diag(spread)), problem.rows
     fitted = film.value + verdict.of_film(problem, best) * film.errors
     judged, edge = verdict.judged(problem, best), _ends(problem, limits)
-    told, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
+    shown, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
         for k, level in enumerate(LEVELS)
@@ -227,20 +229,20 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
     }
     found = xr.Dataset(
         {
-            "value": ("parameter", problem.values(best.place), {"long_name": "value that fits best"}),
+            "value": ("parameter", problem.values(best.place), {"long_name": "best-fit value"}),
             **ends,
-            "edge": ("parameter", edge, {"long_name": "ends of the interval of 95 % that are ends of the search",
+            "edge": ("parameter", edge, {"long_name": "ends of the 95 % interval that are limits of the search",
                                          "flag_values": np.arange(4, dtype=np.int8),
                                          "flag_meanings": "none lower upper both"}),
             "range_from": ("parameter", [each.low for each in problem.free.values()],
-                           {"long_name": "least value that was tried"}),
+                           {"long_name": "lower limit of the search"}),
             "range_to": ("parameter", [each.high for each in problem.free.values()],
-                         {"long_name": "largest value that was tried"}),
+                         {"long_name": "upper limit of the search"}),
             "correlation": (("parameter", "other"), spread / np.outer(deviation, deviation)),
             "minimum": (("rank", "parameter"), problem.values(np.array([each.place for each in minima]))),
             "misfit": ("rank", [each.misfit / unit for each in minima], {"long_name": "chi square of a minimum"}),
-            "seen": ("time", film.value, told),
-            "fitted": ("time", fitted, told),
+            "seen": ("time", film.value, shown),
+            "fitted": ("time", fitted, shown),
             "outlier": ("time", ~problem.kept, {"long_name": "row that is left out"}),
         },
         {"parameter": names, "other": names, "time": ("time", film.time, clock)},
@@ -261,7 +263,7 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
 
 
 def _ends(problem: Problem, limits: Array) -> Array:
-    """Which ends of the intervals of 95 % are those of the search: 1 the lower, 2 the upper, 3 both; shape (free,)."""
+    """Return which ends of the 95 % intervals are limits of the search: 1 lower, 2 upper, 3 both; shape (free,)."""
     low, high = limits[-1]
     return np.array([
         (each.ends(one) < 0) + 2 * (each.ends(other) > 0)
@@ -270,9 +272,10 @@ def _ends(problem: Problem, limits: Array) -> Array:
 
 
 def _with(config: Config, values: Mapping[str, float]) -> Config:
-    """`config` with these values of its parameters."""
+    """Return `config` with these values of its parameters."""
     fixed = {name: Values.one(value) for name, value in values.items() if name not in UNKNOWNS}
-    measure = tuple(spec for spec in config.measure if spec.partition("=")[0] != Misfit.name)  # its film lies elsewhere
+    # The path to the film of a misfit would no longer hold.
+    measure = tuple(spec for spec in config.measure if spec.partition("=")[0] != Misfit.name)
     return replace(
         config, name=f"{config.name}_fit", parameters=config.parameters | fixed, measure=measure, film=None
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Which of the uncertain parameters a result depends on: Sobol indices, from a run of samples that share parameters.
+"""Finds which uncertain parameters a result depends on: Sobol indices, from a run of samples that share parameters.
 
 The design is that of Saltelli et al. (2010), doi 10.1016/j.cpc.2009.09.018, and SciPy estimates the indices.
 """
@@ -17,20 +17,20 @@ from sweep.engine.whole import Whole
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
-from sweep.studies.kept import Task
 from sweep.studies.search import require_simulated
+from sweep.studies.study import Task
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
 QUANTITIES = ("reversals", "t_first_reversal", "t_last_reversal", "spin_mean")
-"""The results whose indices are found, as far as they are measured."""
+"""The results whose indices are computed, if they are measured."""
 
 _RESAMPLED = 400
-"""Resamples of an interval: its ends are then certain to a tenth of its width."""
+"""Number of resamples for an interval, which makes its ends certain to a tenth of its width."""
 
 _ORDERS = {
-    "first_order": ("first-order Sobol index", "Share of the variance that goes where the parameter alone is known."),
-    "total_order": ("total Sobol index", "Share of the variance that stays where all parameters but this are known."),
+    "first_order": ("first-order Sobol index", "Share of the variance that fixing this parameter alone would remove."),
+    "total_order": ("total Sobol index", "Share of the variance that remains if all other parameters are fixed."),
 }
 
 VARIABLES = {
@@ -38,24 +38,24 @@ VARIABLES = {
     for order, (long_name, description) in _ORDERS.items()
     for end, where in (("", ""), ("_low", ", lower end of 95 %"), ("_high", ", upper end of 95 %"))
 }
-"""The variables of the dataset, over quantities and parameters."""
+"""Variables of the dataset, over quantities and parameters."""
 
 
 def indices(config: Config) -> Task:
-    """What `sweep.api.indices` asks for."""
+    """Arguments of `sweep.api.indices`."""
     return Task(designed(config), "indices", "Sobol indices", Indices)
 
 
 def designed(config: Config) -> Config:
-    """`config` with the samples of the design, n (parameters + 2) of them; `ConfigError` if it has none.
+    """Return `config` with the samples of the design, n (parameters + 2) of them; raise a `ConfigError` if it has none.
 
-    The first n are independent of the next; then come the first n again for each parameter, with that parameter from
-    the next.  n is the number of samples that the configuration asks for, rounded up to a power of two.
+    The first n samples and the next n are independent; then the first n are repeated for each parameter, with that
+    parameter taken from the second n. n is the number of samples in the configuration, rounded up to a power of two.
     """
     require_simulated(config)
     if not config.samples:
-        words = "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}"
-        raise ConfigError([config.fault((), words)])
+        message = "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}"
+        raise ConfigError([config.fault((), message)])
     if config.axes:
         name = next(iter(config.axes))
         raise ConfigError([config.fault(config.table[name].place, "cannot be an axis of indices; give one number")])
@@ -68,10 +68,10 @@ def designed(config: Config) -> Config:
 
 
 class Indices(Whole):
-    """A run of the design, and the indices that follow from it."""
+    """A run of the design, and the indices computed from it."""
 
     def dataset(self) -> xr.Dataset:
-        """The indices of all quantities that were measured; NaN where a sample failed, or none differs."""
+        """Return the indices of all measured quantities; NaN where a sample failed, or all samples agree."""
         arrays = self._gather()
         names = [name for name in QUANTITIES if name in arrays]
         failed = np.isin(arrays["status"], (*FAILURES, IMPOSSIBLE))
@@ -87,15 +87,15 @@ class Indices(Whole):
 
 
 def estimated(values: Array, seed: int) -> dict[str, Array]:
-    """Estimate the indices and their intervals of 95 %, by name, each of shape (quantities, parameters).
+    """Estimate the indices and their 95 % intervals, by name, each of shape (quantities, parameters).
 
     Parameters
     ----------
     values : the results of the design, shape (quantities, parameters + 2, n), n being a power of two
     """
-    known = np.ptp(values, axis=(1, 2)) > 0  # SciPy would give 0 for a result that is NaN, or always the same
+    known = np.ptp(values, axis=(1, 2)) > 0  # SciPy would give 0 for a result that is NaN or constant
     quantities, both, n = values.shape
-    # SciPy drops dimensions of length one, and fails if there is no other: so one more quantity is there, all zero.
+    # SciPy drops dimensions of length one, and fails if no other is left: so a further quantity is added, all zero.
     filled = np.zeros((quantities + 1, both, n))
     filled[:-1][known] = values[known]
 
@@ -104,7 +104,7 @@ def estimated(values: Array, seed: int) -> dict[str, Array]:
         found = stats.sobol_indices(func={"f_A": first, "f_B": second, "f_AB": np.stack(mixed)}, n=n)
         return np.reshape([found.first_order, found.total_order], (len(_ORDERS), quantities + 1, both - 2))
 
-    # `bootstrap` of what `sobol_indices` returns takes no seed.
+    # The `bootstrap` method of what `sobol_indices` returns takes no seed.
     low, high = stats.bootstrap(
         (np.arange(n),), find, vectorized=False, n_resamples=_RESAMPLED, method="percentile", rng=seed
     ).confidence_interval

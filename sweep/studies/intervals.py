@@ -1,7 +1,7 @@
 """Finds the intervals of a fit: how far each parameter can go while the others keep the misfit low.
 
 An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
-within 1 or 3.84 of its least (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).
+within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).
 """
 
 from __future__ import annotations
@@ -12,43 +12,43 @@ from functools import partial
 import numpy as np
 
 from sweep.grid import Array
+from sweep.studies.concurrent import run_concurrently
 from sweep.studies.misfit import Ask, Minimum, Problem, minimise
-from sweep.studies.together import together
 
 LEVELS = {68: 1.0, 95: 3.84}
-"""Percent of an interval, and how far its ends raise the misfit: quantiles of chi square for one parameter."""
+"""Percentages of the intervals, and rise of the misfit at their ends: quantiles of chi square for one parameter."""
 
-# A direction is not determined if its 95 % interval is longer than this share of the ranges.
+# A direction is undetermined if its 95 % interval is longer than this share of the ranges.
 _BLIND = 0.5
 
-# How often intervals are sought anew because a lower minimum has turned up.
+# Number of times intervals are computed again because a lower minimum has turned up.
 _RESTARTS = 3
 
-# How exact a profile has to be, in units of the variance.
+# Accuracy of a profile, in units of the variance.
 _ENOUGH = 3e-3
 
-# Correlation of two parameters beyond which neither is known without the other.
+# Correlation of two parameters above which neither is known without the other.
 _TIED = 0.98
 
 
 def variance(problem: Problem, best: Minimum) -> float:
-    """The variance of the residuals: 1 if the film tells its errors."""
+    """Return the variance of the residuals: 1 if the film gives its errors."""
     if problem.film.error is not None:
         return 1.0
     return best.misfit / (problem.rows - len(problem.free))
 
 
 def intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> tuple[Minimum, Array, bool]:
-    """The best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
+    """Return the best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
 
-    An end at 0 or 1 is that of the range.  Where a profile meets a lower minimum, all begins anew from that.  If
-    that happens more than once, the misfit is rugged, which is told as well.
+    An end at 0 or 1 is an end of the range. If a profile meets a lower minimum, the computation starts again from
+    there. If that happens more than once, the misfit is rugged, which is reported too.
     """
     for restart in range(_RESTARTS + 1):
         limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
         if lower is None:
             break
-        (best,) = together([partial(minimise, place=lower.place)], problem.answers)
+        (best,) = run_concurrently([partial(minimise, place=lower.place)], problem.answers)
         note(f"a lower minimum: {best.misfit:.6g}")
     return best, limits, restart > 1
 
@@ -56,21 +56,21 @@ def intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> t
 def _profiles(
     problem: Problem, best: Minimum, note: Callable[[str], None], *, stops: bool
 ) -> tuple[Array, Minimum | None]:
-    """The ends of all intervals, shape (levels, 2, free), or, if that `stops` it, a minimum that is lower."""
+    """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
     parameters = range(len(problem.free))
     sides = [partial(_side, problem=problem, best=best, i=i, sign=sign) for sign in (-1, 1) for i in parameters]
-    found = together(sides, problem.answers, lambda side: stops and side[1] is not None)
+    found = run_concurrently(sides, problem.answers, lambda side: stops and side[1] is not None)
     note(f"intervals: {problem.trajectories} trajectories so far")
     lower = min((each for _, each in found if each), key=lambda each: each.misfit, default=None)
     if lower and stops:
         return np.empty(0), lower
     low, high = np.reshape([ends for ends, _ in found], (2, len(problem.free), len(LEVELS))).transpose(0, 2, 1)
-    # In a rugged misfit a narrow search may have come farther; what fits so well belongs to the wide interval too.
+    # In a rugged misfit a narrow search may have come farther; its end then belongs to the wide interval too.
     return np.stack([np.minimum.accumulate(low), np.maximum.accumulate(high)], axis=1), None
 
 
 def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple[list[float], Minimum | None]:
-    """Where one parameter leaves its intervals of `LEVELS` on one side, and a lower minimum if one is met."""
+    """Find where one parameter leaves its intervals of `LEVELS` on one side, and a lower minimum if one is met."""
     spread, unit = covariance(problem, best), variance(problem, best)
     size = np.sqrt(max(spread[i, i], 1e-30))
     along, reach, ends = spread[:, i] / size**2, float(size), list[float]()
@@ -92,7 +92,7 @@ def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple
                 break
             reach = abs(end - best.place[i])
             near, far = (reach, far) if above < allowed else (near, reach)
-            # A profile is nearly a parabola; where it is not, halve.
+            # A profile is nearly a parabola; where it is not, halve the interval.
             guess = reach * float(np.sqrt(allowed / max(above, 0.05 * allowed)))
             reach = guess if near < guess < far else (near + far) / 2
         ends.append(float(np.clip(best.place[i] + sign * reach, 0, 1)))
@@ -102,10 +102,10 @@ def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple
 
 
 def _starts(valley: list[Array], straight: Array, i: int, end: float) -> list[Array]:
-    """Places from which to go down to the bottom of a valley, which may be curved, where parameter `i` is at `end`.
+    """Return places from which to descend into a valley, which may be curved, with parameter `i` at `end`.
 
-    They are on the straight line of the linear theory, on that through the two places of the `valley` that are nearest
-    to the end, and at the nearest of them.
+    They lie on the straight line of the linear theory, on the line through the two places of the `valley` nearest to
+    the end, and at the nearest of them.
     """
     near = sorted(valley, key=lambda each: abs(each[i] - end))[:2]
     starts = [straight, near[0].copy()]
@@ -118,27 +118,29 @@ def _starts(valley: list[Array], straight: Array, i: int, end: float) -> list[Ar
 
 
 def covariance(problem: Problem, best: Minimum) -> Array:
-    """Of the places, by the Jacobian; a direction that the film does not see is as wide as its range."""
+    """Return the covariance of the places, from the Jacobian; unconstrained directions are as wide as their ranges."""
     sizes, directions = np.linalg.eigh(best.jacobian.T @ best.jacobian / variance(problem, best))
     return np.asarray((directions / np.maximum(sizes, 1.0)) @ directions.T)
 
 
 def blind(problem: Problem, best: Minimum) -> list[str]:
-    """What the film does not determine, in words."""
+    """Describe what the film does not determine."""
     spread, names = covariance(problem, best), list(problem.free)
     sizes, directions = np.linalg.eigh(spread)
-    words = []
+    sentences = []
     for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
         if 4 * np.sqrt(size) > _BLIND:
             some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
-            together = " and ".join(some) + (" together" if len(some) > 1 else "")
-            words.append(f"the film hardly determines {together}: the interval of 95 % is half of the range or more")
+            parameters = " and ".join(some) + (" together" if len(some) > 1 else "")
+            sentences.append(
+                f"the film hardly determines {parameters}: the 95 % interval covers half of the range or more"
+            )
     deviation = np.sqrt(np.diag(spread))
     tied = spread / np.outer(deviation, deviation)
-    words += [
-        f"{names[i]} and {names[j]} are known only together: their correlation is {tied[i, j]:.3f}"
+    sentences += [
+        f"{names[i]} and {names[j]} are known only in combination: their correlation is {tied[i, j]:.3f}"
         for i in range(len(names))
         for j in range(i)
         if abs(tied[i, j]) > _TIED
     ]
-    return words
+    return sentences

@@ -1,7 +1,7 @@
-"""Fits one or several laws of friction to a film, and tells which of them it supports, by Akaike's criterion.
+"""Fits one or several laws of friction to a film, and compares them by Akaike's criterion.
 
-The weight of a law is its share in the evidence, exp(-Δ/2) over the sum of these, with Δ the excess of its criterion
-over the least (Burnham and Anderson 2002, sections 2.6 and 2.9).
+The weight of a law is its share in the evidence, exp(-Δ/2) over the sum of these, where Δ is the excess of its
+criterion over the smallest (Burnham and Anderson 2002, sections 2.6 and 2.9).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from sweep.models.general.laws import LAWS, Law
 from sweep.studies.fit import fit, with_optional
 from sweep.studies.ranges import wide
 
-# Differences of the criterion up to which two laws cannot be told apart, and from which on one is ruled out.  A
-# parameter that is of no use makes a difference of two.
+# Differences of the criterion up to which two laws cannot be distinguished, and above which one is ruled out. A useless
+# parameter makes a difference of two.
 _ALIKE, _RULED_OUT = 4.0, 10.0
 
-# Standard deviations by which chi square may exceed its mean before the film is said to be missed.
+# Standard deviations by which chi square may exceed its mean before the film counts as missed.
 _MISSED = 5.0
 
 _SHARED = ("seen", "other", "minimum", "misfit", "correlation")
-"""Variables of a fit that are those of the film, or have no place beside other laws."""
+"""Variables of a fit that describe the film, or have no place in a comparison of laws."""
 
 
 def fitted(
@@ -41,9 +41,9 @@ def fitted(
     reporter: Reporter,
     columns: tuple[str, str] = ("", ""),
 ) -> xr.Dataset:
-    """As `sweep.api.fit`; `columns` are those of the time and of what is seen."""
+    """Fit as `sweep.api.fit`; `columns` names the time and data columns."""
     if laws and (config.origin or config.model != "slip"):
-        raise fault_of("laws of friction are compared in the slip model; set model: slip")
+        raise fault_of("laws of friction can be compared only in the slip model; set model: slip")
     film, note = film if isinstance(film, Film) else read(film, *columns), reporter.note
     config = with_optional(config, free)
     if not laws:
@@ -59,17 +59,17 @@ def fitted(
 
 
 def _full_name(name: str) -> str:
-    """The name of a law, with the first regularisation if it has several and none is said."""
+    """Return the name of a law, with the first regularisation if it has several and none is given."""
     full = next((each for each in LAWS if each == name or each.startswith(f"{name}-")), None)
     if full is None:
-        raise fault_of(f"{brief(name)} is no law of friction{suggestion(name, LAWS)}; choose from {', '.join(LAWS)}")
+        raise fault_of(f"{brief(name)} is not a law of friction{suggestion(name, LAWS)}; choose from {', '.join(LAWS)}")
     return full
 
 
 def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
-    """`config` with another law, and those parameters of the law that it does not say, which are free.
+    """Return `config` with another law, and the parameters of the law that it does not give, which are free.
 
-    A coefficient of dry friction says nothing of a viscous one, and the other way round.
+    A coefficient of dry friction says nothing about a viscous one, and vice versa.
     """
     document, before = config.document(), LAWS[config.law]
     kept = {key: document[key] for key in document if key not in ("integrator", "measure", "refine")}
@@ -86,11 +86,11 @@ def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
 
 
 def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
-    """The fits of all laws, with what weighs them."""
+    """Return the fits of all laws, with their weights."""
     fits, rows = list(found.values()), len(film.time)
     number = np.array([each.sizes["parameter"] for each in fits])
     squares = np.array([rows * each.attrs["root_mean_square"] ** 2 for each in fits])
-    # A film without errors takes them from the law that fits best, the same for all.
+    # A film without errors takes them from the best fit, the same for all laws.
     chi = np.array([each["misfit"].values[0] for each in fits]) if film.error is not None else (
         squares / (squares / (rows - number)).min()
     )  # fmt: skip
@@ -106,31 +106,31 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
         akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
         weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
     )
-    words = apart_words = _told_apart(names, akaike - akaike.min())
+    sentences = apart_words = _told_apart(names, akaike - akaike.min())
     excess = chi[best] / (rows - number[best])
     if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
-        words = [
-            *words,
+        sentences = [
+            *sentences,
             f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant",
         ]
     blind = ((name, each) for name, one in found.items() for each in one.attrs["undetermined"].split("; ") if each)
-    words = [*words, *(f"{name}: {each}" for name, each in blind)]
+    sentences = [*sentences, *(f"{name}: {each}" for name, each in blind)]
     attributes: dict[str, Any] = dict(fits[best].attrs)
     attributes["title"] = attributes["title"].replace(": fitted", ": laws of friction fitted")
-    attributes |= {"undetermined": "; ".join(words), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
+    attributes |= {"undetermined": "; ".join(sentences), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
     attributes["verdict"] = f"{names[best]}: {attributes['verdict']}" + "".join(f"\n{each}." for each in apart_words)
     return result.assign_attrs(attributes)
 
 
 def _told_apart(names: Sequence[str], excess: np.ndarray) -> list[str]:
-    """What the film says of each law beside the best, in words."""
-    words, (best, *others) = [], np.argsort(excess, kind="stable")
+    """Describe what the film says of each law compared with the best."""
+    sentences, (best, *others) = [], np.argsort(excess, kind="stable")
     for i in others:
         by = f"Akaike's criteria differ by {excess[i]:.3g}"
         if excess[i] < _ALIKE:
-            words.append(f"{names[best]} and {names[i]} cannot be told apart by this film: {by}")
+            sentences.append(f"{names[best]} and {names[i]} cannot be distinguished by this film: {by}")
         elif excess[i] < _RULED_OUT:
-            words.append(f"{names[i]} is less likely than {names[best]}: {by}")
+            sentences.append(f"{names[i]} is less likely than {names[best]}: {by}")
         else:
-            words.append(f"{names[i]} is ruled out beside {names[best]}: {by}")
-    return words
+            sentences.append(f"{names[i]} is ruled out in favour of {names[best]}: {by}")
+    return sentences

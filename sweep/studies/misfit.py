@@ -1,8 +1,8 @@
-"""How far trajectories are from a film: the misfit, a sum of squares of (computed - seen) / error, and its minima.
+"""Computes how far trajectories are from a film, the sum of squares of (computed - seen) / error, and its minima.
 
-SciPy minimises, from several places side by side.  A trajectory and its neighbours on both sides, the columns of the
-Jacobian, take the same steps: the misfit is as smooth as the motion, where steps that adapt would leave minima of their
-own (Creswell et al. 2024, doi 10.1098/rsif.2023.0369).
+SciPy minimises from several places in parallel. A trajectory and its neighbours on both sides, which give the columns
+of the Jacobian, take the same steps: the misfit is then as smooth as the motion, whereas adaptive steps would create
+spurious minima (Creswell et al. 2024, doi 10.1098/rsif.2023.0369).
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from sweep.kernels.samples import sampled
 from sweep.studies.ranges import Range
 
 UNKNOWNS = ("film_delay", "film_bias")
-"""What a fit may find of a film besides the parameters of the body, by the names that the option --free takes."""
+"""Parameters of the film that a fit may find besides those of the body, by the names that the option --free takes."""
 
-# Half the distance of two columns of the Jacobian, as a share of a parameter's range.  With 3e-6 the search in a film
-# of seven reversals in 5 s, which amplify errors, ended at ten times the misfit.
+# Half the distance between two columns of the Jacobian, as a share of a parameter's range. With 3e-6 the search in a
+# film of seven reversals in 5 s, which amplify errors, ended at ten times the misfit.
 _NEAR = 1e-4
 
-# Places that round to the same multiples of this share of the ranges have the same step: that of the first one.
+# Places that round to the same multiples of this share of the ranges share the step of the first one.
 _STEADY = 0.02
 
-# A body that lifts off, or a run that diverges, misses every value by this many times the largest one.
+# If a body lifts off or a run diverges, every value is missed by this multiple of the largest one.
 _LOST = 10.0
 
 ENOUGH = 1e-9
-"""The share by which misfit and place of a minimum are exact."""
+"""Relative accuracy of the misfit and the place of a minimum."""
 
 _FLAT, _MOST_STEPS = 1e-14, 50
 
@@ -48,65 +48,66 @@ class Minimum(NamedTuple):
     """The free parameters, as shares of their ranges, shape (free,)."""
     misfit: float
     jacobian: Array
-    """Of the residuals with respect to the place, shape (instants and measured, free)."""
+    """Jacobian of the residuals with respect to the place, shape (instants and measured, free)."""
     away: Array
     """The residuals, shape (instants and measured,)."""
 
 
 Ask = Callable[[Array], Array]
-"""Gives the residuals, shape (cells, instants and measured), at places, shape (cells, free).
+"""Returns the residuals, shape (cells, instants and measured), at places, shape (cells, free).
 
-These are so close together that their trajectories take the same steps."""
+The places are so close together that their trajectories take the same steps.
+"""
 
 
 @dataclass
 class Problem:
-    """A film, and the trajectories that are to reproduce it."""
+    """A film, and the trajectories that should reproduce it."""
 
     config: Config
     film: Film
     free: Mapping[str, Range]
-    """The free parameters, those of `UNKNOWNS` too, and where they are sought."""
+    """The ranges of the free parameters, including those of `UNKNOWNS`."""
     kept: Array
-    """Which instants count, shape (instants,): not the outliers."""
+    """Mask of the instants that count, shape (instants,); outliers do not."""
     scale: float = 1.0
-    """The standard deviation of a residual, by which what was measured of a parameter is weighed."""
+    """The standard deviation of a residual, which sets the weight of measured parameters."""
     trajectories: int = 0
-    """How many were computed."""
+    """Number of trajectories computed so far."""
     _steps: dict[tuple[float, ...], float] = field(default_factory=dict)
     """Steps by rounded places."""
 
     @property
     def rows(self) -> int:
-        """How many residuals count."""
+        """Number of residuals that count."""
         return int(self.kept.sum()) + len(self.measured)
 
     @property
     def measured(self) -> list[int]:
-        """The indices of parameters that were measured otherwise."""
+        """Indices of the parameters that were measured independently."""
         return [i for i, each in enumerate(self.free.values()) if each.prior]
 
     def values(self, places: Array) -> Array:
-        """The free parameters at places, of the same shape (..., free)."""
+        """Return the free parameters at places, of the same shape (..., free)."""
         return np.stack([each.values(places[..., i]) for i, each in enumerate(self.free.values())], axis=-1)
 
     def place(self, values: Array) -> Array:
-        """The place of values, both of shape (free,)."""
+        """Return the place of values, both of shape (free,)."""
         return np.array([each.place(value) for each, value in zip(self.free.values(), values, strict=True)])
 
     def columns(self, places: Array) -> dict[str, Array]:
-        """All parameters of the bodies at places of shape (cells, free)."""
+        """Return all parameters of the bodies at places of shape (cells, free)."""
         fixed = {name: np.full(len(places), v.numbers[0]) for name, v in self.config.parameters.items()}
         return fixed | {name: values for name, values in self._found(places).items() if name not in UNKNOWNS}
 
     def _found(self, places: Array) -> dict[str, Array]:
-        """The free parameters at places of shape (cells, free), by name."""
+        """Return the free parameters at places of shape (cells, free), by name."""
         return {name: np.ascontiguousarray(each) for name, each in zip(self.free, self.values(places).T, strict=True)}
 
     def curves(self, places: Array, times: Array, steps: Array | None = None) -> Array:
-        """What a film shows of the trajectories at `places`, shape (cells, times); NaN for one that is lost.
+        """Return what a film of the trajectories at `places` would show, shape (cells, times); NaN for lost ones.
 
-        Without `steps`, of shape (cells,), each takes its automatic one.
+        Without `steps`, of shape (cells,), each trajectory takes its automatic step.
         """
         model, columns, found = self.config.equations, self.columns(places), self._found(places)
         self.trajectories += len(places)
@@ -121,24 +122,24 @@ class Problem:
         return curves
 
     def residuals(self, places: Array, instants: int | None = None, steps: Array | None = None) -> Array:
-        """(computed - seen) / error at all or the first `instants` of the film, shape (cells, instants).
+        """Return (computed - seen) / error at all or the first `instants` of the film, shape (cells, instants).
 
         It is zero for outliers.
         """
         seen, error, kept = self.film.value[:instants], self.film.errors[:instants], self.kept[:instants]
         away = self.curves(places, self.film.time[:instants], steps) - seen
-        if self.film.what == "heading":  # no film shows where a heading counts from
+        if self.film.what == "heading":  # a film does not show where a heading is counted from
             away -= np.average(away, axis=1, weights=kept * error**-2.0)[:, None]
         return np.where(np.isnan(away), _LOST * np.abs(seen[kept]).max(), away) / error * kept
 
     def _off_measured(self, places: Array) -> Array:
-        """How far parameters that were measured are from what was measured, in errors, shape (cells, measured)."""
+        """Return the deviations of parameters from their measured values, in errors, shape (cells, measured)."""
         known = [(self.values(places)[:, i], [*self.free.values()][i].prior) for i in self.measured]
         found = [(value - prior[0]) / prior[1] for value, prior in known if prior]
         return self.scale * np.reshape(found, (len(found), len(places))).T
 
     def answers(self, places: Sequence[Array], instants: int | None = None) -> Iterator[Array]:
-        """The residuals that searches `Ask` for: of the film and, behind these, of what was measured otherwise."""
+        """Return the residuals that searches `Ask` for: of the film and, after these, of independent measurements."""
         cells = np.concatenate(places)
         steps = [np.full(len(each), step) for each, step in zip(places, self._steps_of(places), strict=True)]
         found = self.residuals(cells, instants, np.concatenate(steps))
@@ -146,10 +147,10 @@ class Problem:
         return iter(np.split(found, np.cumsum([len(each) for each in places[:-1]])))
 
     def _steps_of(self, places: Sequence[Array]) -> list[float]:
-        """For each of `places` the automatic step of the first there, or of the first ever that was as close to it."""
+        """Return for each of the `places` the automatic step of the first there, or of the first ever close to it."""
         keys = [tuple(np.round(each[0] / _STEADY).tolist()) for each in places]
         new = {key: each[0] for key, each in zip(keys, places, strict=True) if np.isinf(self._steps.get(key, np.inf))}
-        if new:  # together, as that takes no longer than one alone
+        if new:  # together, since one alone takes as long
             model, columns = self.config.equations, self.columns(np.stack([*new.values()]))
             possible = np.flatnonzero(~model.impossible(columns))
             columns, steps = {name: values[possible] for name, values in columns.items()}, np.full(len(new), np.inf)
@@ -159,9 +160,9 @@ class Problem:
 
 
 def minimise(ask: Ask, place: Array, fixed: int | None = None, enough: float = ENOUGH) -> Minimum:
-    """The minimum near a place, over all parameters but the `fixed` one.
+    """Find the minimum near a place, over all parameters except the `fixed` one.
 
-    It is found when a step changes misfit or place by less than the share `enough`, or there is no slope.
+    The search ends when a step changes misfit or place by less than the share `enough`, or the slope vanishes.
     """
     moved = np.array([i for i in range(len(place)) if i != fixed], int)
     known: dict[bytes, tuple[Array, Array]] = {}

@@ -1,4 +1,4 @@
-"""Says what theory says of the cells of a sweep, without running it."""
+"""Predicts the cells of a sweep from theory, without running it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from sweep.results import dataset
 
 
 def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
-    """The predictions alone, of the paper and of the linear theory, on the grid of `config`.
+    """Return the predictions of the paper and of the linear theory on the grid of `config`, without simulating.
 
-    With the measurement `first_reversal` the time of the first reversal is predicted as well.
+    If `first_reversal` is measured, the time of the first reversal is predicted as well.
 
     Parameters
     ----------
-    config : a configuration, a mapping that says what its file would, or the path of a file
+    config : a configuration, a mapping with the contents of its file, or the path of a file
     overrides : values that replace those of the file, such as ``mu=60``
 
     Raises

@@ -1,6 +1,6 @@
-"""Finds the ranges in which a fit seeks parameters that have a single value: from the film, the body and the law.
+"""Finds the search ranges of free parameters with a single value, from the film, the body and the law.
 
-Places in a range are even in asinh(value / bend), which is linear for a large bend and logarithmic for a small one.
+Places in a range are uniform in asinh(value / bend), which is linear for a large bend and logarithmic for a small one.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from sweep.units import SI
 
 @dataclass(frozen=True)
 class Range:
-    """Where a parameter is sought."""
+    """The range in which a parameter is sought."""
 
     low: float
     high: float
     bend: float
     least: float = -inf
-    """The bounds beyond which it is not widened."""
+    """Bounds of widening."""
     most: float = inf
     given: bool = False
-    """Whether the user has given the ends, so that they are not widened."""
+    """Whether the user gave the ends, which are then not widened."""
     prior: tuple[float, float] | None = None
     """Mean and standard deviation, if the parameter was measured."""
 
     @classmethod
     def even(cls, one: float, other: float, least: float = -inf, most: float = inf) -> Range:
-        """A range between two numbers that is linear, or logarithmic if it does not reach zero."""
+        """Return a range between two numbers that is linear, or logarithmic if it does not reach zero."""
         (low, high), (near, far) = sorted((one, other)), sorted((abs(one), abs(other)))
         return cls(low, high, near / _MUCH if low * high > 0 else far * _MUCH, least, most)
 
@@ -52,7 +52,7 @@ class Range:
         return float(np.clip((at - low) / (high - low), 0, 1))
 
     def widened(self, *, up: bool) -> Range:
-        """The range with one end farther out, by a factor of four or by half its length, unless that end is fixed."""
+        """Return the range with one end moved outwards by a factor of four or half its length, unless it is fixed."""
         low, high = np.arcsinh(np.array([self.low, self.high]) / self.bend)
         end = self.bend * np.sinh((high if up else low) + (1 if up else -1) * min((high - low) / 2, log(4)))
         if self.given or self.prior:
@@ -62,7 +62,8 @@ class Range:
         return replace(self, high=min(end, self.most)) if up else replace(self, low=max(end, self.least))
 
     def ends(self, place: float, near: float = 0.0) -> int:
-        """-1 or 1 if a place is at the lower or upper end of the search, 0 if not; zero, as of a drag, is no end."""
+        """Return -1 or 1 if a place is at the lower or upper end of the search, else 0; a bound at zero is not an
+        end."""
         if place <= near and (self.low or self.least):
             return -1
         return int(place >= 1 - near)
@@ -71,29 +72,29 @@ class Range:
 _MUCH = 1e9
 
 _ROWS = 1500
-"""Rows of a film from whose last third the drag is estimated."""
+"""Minimum number of rows of a film whose last third gives the drag."""
 
-# What a hand does to a body: how far it takes its contact point, as a share of a and b, or tilts it.
+# Typical action of a hand: how far it moves the contact point, as a share of a and b, or tilts the body.
 _FARTHEST, _TILTED = 0.2, 0.15
 
 _STARTS = {"x0": "a", "y0": "b", "pitch": "", "roll": ""}
 _ON_BODY = 0.65
-"""Share of both semi-axes within which a start point is sought: the corners are on the body."""
+"""Share of both semi-axes within which a start point is sought, so that the corners lie on the body."""
 
-# Shares of a range of parameters that may vanish, or have either sign, within which it is linear.
+# Share of the range of a parameter that may vanish or have either sign within which places are linear.
 _FROM_ZERO, _EITHER_SIGN = 1 / 300, 1 / 100
 
 
 def of_film(film: Film) -> dict[str, Range]:
-    """The ranges of what may be free of the film itself, by name."""
+    """Return the ranges of the film's own free parameters, by name."""
     bias = float(np.abs(film.value).max()) / 10
     delay = {"film_delay": Range.even(0.0, float(film.time[-1]) / 10, least=0.0)}
-    # No film shows where a heading counts from, so that it has no bias.
+    # A film does not show where a heading is counted from, so a heading has no bias.
     return delay | ({} if film.what == "heading" else {"film_bias": Range.even(-bias, bias)})
 
 
 def of_parameter(config: Config, film: Film, name: str) -> Range:
-    """The range of a parameter of `config`; `ConfigError` where nothing gives it."""
+    """Return the range of a parameter of `config`; raise a `ConfigError` if nothing defines it."""
     values, parameter = config.parameters[name], config.table[name]
     least, most = max(parameter.above, parameter.at_least), parameter.below
     if values.is_axis and len(values.numbers) > 1:
@@ -114,16 +115,16 @@ def of_parameter(config: Config, film: Film, name: str) -> Range:
 
 
 def measured(parameter: Parameter, known: Distribution) -> Range:
-    """The range of a parameter that was measured, and its prior, which is normal."""
+    """Return the range of a measured parameter, and its normal prior."""
     low, below, centre, above, high = known.at(ndtr(np.array([-4.0, -1.0, 0.0, 1.0, 4.0]))).tolist()
     ends = max(low, parameter.above, parameter.at_least), min(high, parameter.below)
     return Range(*ends, _MUCH * max(map(abs, ends)), prior=(centre, (above - below) / 2))
 
 
 def _around(config: Config, parameter: Parameter, value: float, least: float, most: float) -> Range:
-    """From a fifth to five times of a positive value; up to twice one that may be negative, with either sign."""
+    """Return the range from 1/5 to 5 times a positive value; up to twice one that may be negative, of either sign."""
     if value == 0:
-        message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero tells no size"
+        message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero sets no scale"
         raise ConfigError([config.fault(parameter.place, message)])
     if least >= 0:
         return Range.even(value / 5, min(value * 5, most), least=least, most=most)
@@ -131,7 +132,7 @@ def _around(config: Config, parameter: Parameter, value: float, least: float, mo
 
 
 def _spins(film: Film, sign: int) -> Range:
-    """The start spin: that of the film's first twelfth, and as much around it as it varies there."""
+    """Return the range of the start spin: the film's first twelfth, widened by as much as the spin varies there."""
     first = slice(0, max(8, len(film.time) // 12))
     time, value = film.time[first], film.value[first]
     if film.what == "heading":
@@ -144,8 +145,8 @@ def _spins(film: Film, sign: int) -> Range:
 
 
 def _drag(config: Config, film: Film) -> float:
-    """The largest drag that the film's end allows: five times what it loses there, if all of it were drag."""
-    # No more rows than that: slopes are those of all pairs.
+    """Return the largest drag compatible with the film's end: five times the loss there, if all of it were drag."""
+    # Use no more rows than that, since slopes are those of all pairs.
     last = slice(len(film.time) * 2 // 3, None, max(1, len(film.time) // _ROWS))
     spin = np.gradient(film.value, film.time) if film.what == "heading" else film.value
     size = np.abs(spin[last])
@@ -157,7 +158,7 @@ def _drag(config: Config, film: Film) -> float:
 
 
 def _starts(config: Config, name: str, value: float) -> Range:
-    """The start point or tilt, of either sign, which is nearly logarithmic."""
+    """Return the range of the start point or tilt, of either sign, nearly logarithmic."""
     size = _STARTS[name]
     length = min(config.parameters[size].numbers) if size else 1.0
     most = _ON_BODY * length if size and config.surface == "ellipsoid" else inf
@@ -166,9 +167,9 @@ def _starts(config: Config, name: str, value: float) -> Range:
 
 
 def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
-    """The names of the start point or tilt where both signs together start the same motion, half a turn later.
+    """Return the names of the start point or tilt, where reversing both signs gives the same motion, half a turn later.
 
-    Half a turn takes a body to itself unless it has an `Ixz` or `Iyz`.
+    Half a turn maps a body onto itself unless it has an `Ixz` or `Iyz`.
     """
     pairs = (pair for pair in (["x0", "y0"], ["pitch", "roll"]) if {*pair} <= free.keys())
     names = next((pair for pair in pairs if all(free[name].low == -free[name].high for name in pair)), [])
@@ -178,7 +179,7 @@ def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
 
 
 def wide(config: Config, law: Law) -> Mapping[str, tuple[float, float]]:
-    """The ranges of the parameters of a law of friction, whatever the configuration says of them."""
+    """Return the ranges of the parameters of a law of friction, whatever the configuration says of them."""
     length = config.parameters["c"].numbers[0] if config.units == SI else 1.0
     velocity = sqrt(length * config.parameters["gravity"].numbers[0]) if config.units == SI else 1.0
     return {

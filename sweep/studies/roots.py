@@ -1,9 +1,9 @@
 """Narrows brackets around the roots of functions that simulations evaluate, for many roots at once.
 
-What counts is only the sign.  The value proposes where to look next: near a root it is smooth, so that interpolation
-through the nearest values finds it within a few evaluations (inverse interpolation; Brent 1973, chapter 4).  Once the
-proposals hardly differ, or have been followed a few times, the next two places are just below and above the proposed
-one, so that both ends of the bracket close in.  Where that fails, the bracket is cut into equal parts.
+Only the sign counts. The value proposes where to look next: near a root it is smooth, so that interpolation through the
+nearest values finds it within a few evaluations (inverse interpolation; Brent 1973, chapter 4). Once the proposals
+hardly differ, or a few have been followed, the next two places are just below and above the proposed one, so that both
+ends of the bracket close in. If that fails, the bracket is divided into equal parts.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ from math import prod
 
 import numpy as np
 
-# Half the distance of the last two places, in widths: a little less than the half.
+# Half the distance between the last two places, in widths: a little less than a half.
 _HALF = 0.45
 
-# How far on each side of a proposed root the next places are, in units of its uncertainty; and the factor by which they
-# are farther in each round after the root was on neither side.
+# Distance of the next places on each side of a proposed root, in units of its uncertainty; and the factor by which it
+# grows in each round in which the root was on neither side.
 _BESIDE, _FARTHER = 2.0, 10.0
 
-# The most proposals that are followed one by one.  With pairs from the start it takes one evaluation more.
+# Most proposals that are followed one by one. Starting with pairs takes one more evaluation.
 _ALONE = 3
 
-# Equal parts into which a bracket is cut where no value tells better.
+# Number of equal parts into which a bracket is divided where the values give no better proposal.
 _PARTS = 4
 
 # Uncertainty of the first proposal, from the two ends alone, relative to their distance.
@@ -37,21 +37,21 @@ class Root:
     low: float
     high: float
     width: float
-    """The distance of the two at which the search ends."""
+    """Distance between the two places at which the search ends."""
     values: dict[float, float]
-    """What is known: the function by place."""
+    """Known values of the function, by place."""
     smooth: dict[float, float]
-    """Of these, the values that belong to the one smooth function that passes through the root."""
+    """Known values on the smooth branch that passes through the root."""
     roughly: bool = False
-    """It may end where the values tell the root within the width, without a bracket as narrow."""
+    """Whether the search may end once the values locate the root within the width, without a bracket that narrow."""
     blank: list[float] = field(default_factory=list)
-    """The places at which it has no value."""
+    """Places where the function has no value."""
     _pair: list[float] = field(default_factory=list)
-    """The places proposed last around a root; empty if the bracket was cut."""
+    """Places last proposed around a root; empty if the bracket was divided."""
     _alone: int = 0
-    """Places proposed one by one since the last pair."""
+    """Number of places proposed one by one since the last pair."""
     _missed: int = 0
-    """Rounds since the root was last between these."""
+    """Rounds since the root last lay between these."""
 
     @property
     def ended(self) -> bool:
@@ -60,16 +60,16 @@ class Root:
 
     @property
     def unknown(self) -> bool:
-        """True if the function has no value somewhere in the bracket; that ends the search."""
+        """Return whether the function has no value somewhere in the bracket, which ends the search."""
         return any(self.low < place < self.high for place in self.blank)
 
     @property
     def expected(self) -> float:
-        """The place in the bracket where the root is, as far as the values tell."""
+        """Return the place in the bracket where the values locate the root."""
         return min(max(self._proposed()[0], self.low), self.high)
 
     def wanted(self) -> list[float]:
-        """The places to evaluate next."""
+        """Return the places to evaluate next."""
         inside = not self._pair or (self._pair[0] <= self.low and self.high <= self._pair[-1])
         self._missed = 0 if inside else self._missed + 1
         root, off = self._proposed()
@@ -80,14 +80,14 @@ class Root:
             return [self.low + (self.high - self.low) * part / _PARTS for part in range(1, _PARTS)]
         if off > aside and not self._missed and self._alone < _ALONE:
             self._alone += 1
-            # It may stay an end of the bracket, and is not to be so near the root that its sign is in doubt.
+            # It may remain an end of the bracket, so it must not be so near the root that its sign is in doubt.
             return [root + aside if self.high - root > root - self.low else root - aside]
         self._alone = 0
         self._pair = [place for place in (root - far, root + far) if self.low < place < self.high]
         return self._pair
 
     def learn(self, place: float, value: float, *, smooth: bool) -> None:
-        """Take in the value at a place; NaN where there is none."""
+        """Record the value at a place; NaN where there is none."""
         if np.isnan(value):
             self.blank.append(place)
             return
@@ -103,14 +103,14 @@ class Root:
 
     @property
     def _known(self) -> bool:
-        """True if the values tell the root within the width, and that is enough."""
+        """Return whether the values locate the root within the width, and that is enough."""
         if not self.roughly or len(self.smooth) < 3:
             return False
         root, off = self._proposed()
         return self.low <= root <= self.high and _BESIDE * off <= _HALF * self.width
 
     def _proposed(self) -> tuple[float, float]:
-        """Where the root is, as far as the values tell, and how uncertain that is."""
+        """Return the place of the root according to the values, and its uncertainty."""
         distinct = {value: (place, value) for place, value in self.smooth.items()}
         known = sorted(distinct.values(), key=lambda pair: abs(pair[1]))[:4]
         if len(known) < 2:
@@ -120,13 +120,13 @@ class Root:
         return best[-1], off
 
     def _secant(self) -> float:
-        """The root of the straight line between the ends."""
+        """Return the root of the straight line between the ends."""
         low, high = self.values[self.low], self.values[self.high]
         return self.low - low * (self.high - self.low) / (high - low)
 
 
 def _inverse(known: list[tuple[float, float]]) -> float:
-    """The place at which the polynomial place(value) has the value zero."""
+    """Return the place at which the polynomial place(value) has the value zero."""
     found = 0.0
     for i, (place, value) in enumerate(known):
         found += place * prod(other / (other - value) for j, (_, other) in enumerate(known) if j != i)

@@ -1,7 +1,6 @@
-"""Simulations that a search asks for in rounds, each of which depends on what the rounds before have found.
+"""Runs the simulations of a search in rounds, each of which depends on the results of earlier rounds.
 
-They are a table of cases that grows, so that a search is checkpointed, interrupted, and spread over a cluster as a run
-is.
+They form a growing table of cases, so that a search is checkpointed, interrupted, and spread over a cluster like a run.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ from sweep.kernels.measures import default
 from sweep.models import MODELS
 from sweep.results.store import Store
 
-# What a search has to know of a cell, where its model allows.
+# What a search needs to know of a cell, if its model supports it.
 _NEEDED = ("reversals", "margin")
 
-# Tolerance while brackets are narrowed, relative to the width aimed at: near a boundary a spin is that small.
+# Tolerance while brackets are narrowed, relative to the intended width: near a boundary a spin is that small.
 _FINER = 1e-4
 
 
 def measuring(config: Config) -> Config:
-    """`config` with what a search needs to know of a cell; margins are those of cells that settle.
+    """Return `config` with the measurements that a search needs; margins are those of cells that settle.
 
-    Next to a boundary many cells are above the tolerance however short the steps are, so none is repeated.
-    What else a run measures unasked stays, so that both have one kernel, which takes longer to compile than a search.
+    Next to a boundary many cells exceed the tolerance however short the steps are, so none is repeated. Other default
+    measurements stay, so that both share one kernel, which takes longer to compile than a search.
     """
     usual = default(config.equations)
     measure = tuple(spec for spec in usual if spec in _NEEDED or spec in config.measure)
@@ -45,7 +44,7 @@ def require_certain(config: Config) -> None:
     """Raise a `ConfigError` if the model is a formula, or a parameter is a distribution."""
     require_simulated(config)
     for name in config.distributions:
-        words = "is a distribution, of which run draws samples; here give a number or an axis"
+        words = "is a distribution, which only run can sample; give a number or an axis here"
         raise ConfigError([config.fault(config.table[name].place, words)])
 
 
@@ -63,31 +62,32 @@ def require_between(option: str, value: float, ends: tuple[float, float]) -> Non
 
 
 class Search(Whole):
-    """A search, and the table of the cells that it has asked for; its dataset is what it has found."""
+    """A search, and the table of the cells that it has requested; its dataset holds the results."""
 
     def __init__(self, config: Config, store: Store, width: float) -> None:
-        """Make a search whose brackets are to be as narrow as `width`, relative to a parameter."""
+        """Make a search whose brackets are narrowed to `width`, relative to a parameter."""
         super().__init__(config, store)
         self.width = width
         self.rounds: list[Mapping[str, Array]] = []
-        """The parameters that vary, of the cells of each round."""
+        """Names of the parameters that vary, in the cells of each round."""
         self.tolerance = config.integrator.tolerance
-        """That of the cells that were asked for last."""
+        """Tolerance of the cells requested last."""
         self.estimates = False
         """Whether their errors are estimated."""
         self._learned = 0
-        """Tiles that the search has learned from."""
+        """Tiles that have been evaluated."""
 
     @abstractmethod
     def ask(self) -> Mapping[str, Array]:
-        """The parameters of the cells to simulate next, each of shape (cells,), in the same order in every round."""
+        """Return the parameters of the cells to simulate next, each of shape (cells,), in an order that never
+        changes."""
 
     @abstractmethod
     def learn(self, found: Mapping[str, Array]) -> None:
-        """Take in what the tiles say of the cells that were asked for last: `status`, `reversals`, margins ..."""
+        """Record the results of the cells requested last: `status`, `reversals`, margins ..."""
 
     def simulated(self) -> Config:
-        """The configuration whose cases are all cells so far."""
+        """Return the configuration whose cases are all cells so far."""
         cases = {n: tuple(np.concatenate([each[n] for each in self.rounds]).tolist()) for n in self.rounds[0]}
         constants = {name: values for name, values in self.config.parameters.items() if name not in cases}
         update = {"tolerance": self.tolerance, "estimate_errors": self.estimates}
@@ -95,7 +95,7 @@ class Search(Whole):
         return replace(self.config, parameters=constants, cases=cases, integrator=integrator)
 
     def grow(self) -> bool:
-        """Add the cells to simulate next, judging by all results so far; False if the search has ended."""
+        """Add the cells to simulate next, judging by all results so far; return False if the search has ended."""
         if self.tiles:
             new = [self.store.load(i) for i in range(self._learned, len(self.tiles))]
             self._learned = len(self.tiles)
@@ -108,11 +108,11 @@ class Search(Whole):
         return self._cut(cells)
 
     def sharp(self, width: float) -> float:
-        """The tolerance with which brackets are narrowed to a width."""
+        """Return the tolerance with which brackets are narrowed to a width."""
         return min(self.config.integrator.tolerance, max(_FINER * width, ROUND_OFF))
 
-    def told(self) -> dict[str, Any]:
-        """The attributes of a dataset: how exact it is, where it comes from, what it has cost."""
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a dataset: its accuracy, provenance and cost."""
         simulations = self.tiles[-1][0].stop if self.tiles else 0
         exact = {"relative_width": self.width, "bracket_tolerance": self.sharp(self.width), "trajectories": simulations}
         return exact | self._attributes(simulations)

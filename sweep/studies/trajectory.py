@@ -1,4 +1,4 @@
-"""Single trajectories, sampled densely in time."""
+"""Follows individual trajectories with dense output in time."""
 
 from __future__ import annotations
 
@@ -48,15 +48,16 @@ from sweep.variables import Variable
 SAMPLES_A_RADIAN = 3
 """Samples per radian of the fastest motion: nearly twenty per period."""
 
-# The fewest blocks of steps between two marks of a run, and the most marks, counting those of each trajectory.  The
-# first stretch of a click in the explorer takes 0.084 s of processor time, 0.099 s with 8 blocks and as long with 1.
+# The smallest number of blocks of steps between two marks of a run, and the largest number of marks, counting those of
+# each trajectory. The first stretch of a click in the explorer takes 0.084 s of processor time, 0.099 s with 8 blocks
+# and as long with 1.
 _BLOCKS, _MARKS = 2, 2048
 
-# Samples that are looked at together.  In the first stretch of a click few are taken at a time, and looking at these
-# at once took half of its processor time.
+# Number of samples evaluated at a time. In the first stretch of a click few are taken, and evaluating them one by one
+# took half of its processor time.
 _TOGETHER = 4096
 
-# Times that differ relatively by less than this are the same one; so are a step and one that is longer by this share.
+# Relative difference below which two times, or two steps, count as equal.
 _SAME, _SAME_STEP = 1e-12, 1e-9
 
 # Every step is taken once to reach the end, and again between the marks for the samples; a sample of the slip model
@@ -64,10 +65,10 @@ _SAME, _SAME_STEP = 1e-12, 1e-9
 _PASSES, _SAMPLE_SECONDS = 2, 2e-6
 
 MAX_TRAJECTORIES = 1000
-"""Every combination of the values asked for is a trajectory."""
+"""Most trajectories; every combination of the requested values is one."""
 
 MAX_SAMPLES = 10_000_000
-"""All samples are held in memory, a kilobyte each while they are taken."""
+"""Most samples, all of which are held in memory, a kilobyte each while they are taken."""
 
 # name: units, long_name, and perhaps a description
 SERIES: dict[str, tuple[Unit, str] | tuple[Unit, str, str]] = {
@@ -108,35 +109,35 @@ def trajectory(
     reporter: Reporter | None = None,
     **at: Any,
 ) -> xr.Dataset:
-    """Follow the cells of `config` picked by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
+    """Follow cells of `config` selected by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
 
-    The method is always dopri5, whatever the configuration names.  A sample is a state between two steps, and adams
-    can go on only from the end of a block of steps, and leaps over stretches of small rattle.
+    The method is always dopri5, whatever the configuration names.  A sample is a state between two steps, but adams can
+    continue only from the end of a block of steps, and leaps over stretches of small rattle.
 
     Parameters
     ----------
     config : as `sweep.config.load_config` takes it
     every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
         per period of the fastest motion
-    stop_when_settled : as of a sweep: end a trajectory when neither spin nor count can change any more.  Otherwise it
-        goes to t_end, whatever the configuration says; with `t_end: .inf`, it always ends there
-    samples : follow so many samples of the parameters that are distributions, those with which a run begins, and not
-        the medians alone
-    reporter : receives progress, counted in time, and messages; by default there are none
-    at : a number, or several as an axis of a configuration has them, by parameter; each combination is one
-        trajectory.  An axis of `config` that is not named takes its first value
+    stop_when_settled : end a trajectory once spin and count can no longer change, as a sweep does. Otherwise it goes to
+        t_end, whatever the configuration says; with `t_end: .inf` it always stops once settled
+    samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
+        samples of a run
+    reporter : receives progress, counted in time, and messages; silent by default
+    at : a number, or an axis as in a configuration, by parameter; each combination is one trajectory. An axis of
+        `config` that is not named takes its first value
 
     Returns
     -------
-    Dataset over (trajectory, time): the series that the model can show, NaN after the end of a trajectory.  Over
-    (trajectory): all that a sweep gives for the cell, from the same steps, which the sampling does not change; the
-    status is `settled` if neither spin nor count would change any more after t_stop.  A sample that lies between two
-    steps is one shorter step away from the first of them.
+    Dataset over (trajectory, time): the series that the model supports, NaN after the end of a trajectory. Over
+    (trajectory): all results that a sweep gives for the cell, from the same steps, which the sampling does not change;
+    the status is `settled` if spin and count could no longer change after t_stop. A sample between two steps is one
+    shorter step away from the first of them.
 
     Raises
     ------
     ConfigError
-        if the model is a formula, `at` picks cells that cannot be run, or the samples do not fit into memory.
+        if the model is a formula, `at` selects cells that cannot be run, or the samples do not fit into memory.
     """
     if every is not None and not (is_number(each := plain_data(every)) and 0 < each < inf):
         raise fault_of(refusal(every, "a finite number > 0"), "every")
@@ -148,20 +149,24 @@ def trajectory(
     if not samples or not load_config(config).distributions.keys() - at.keys():
         return found
     numbers = np.arange(found.sizes["trajectory"]) % samples
-    told = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
-    return found.assign_coords({SAMPLE: ("trajectory", numbers, told)})
+    attributes = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
+    return found.assign_coords({SAMPLE: ("trajectory", numbers, attributes)})
 
 
 def first_values(config: Config, at: Mapping[str, Any]) -> str:
-    """Say in words which axes of `config` take their first value because `at` does not name them; "" if none."""
+    """Name the axes of `config` that take their first value because `at` does not give one; "" if there are none.
+
+    Raises a `ConfigError` first if the cells cannot be run.
+    """
+    choose(config, at)
     config = config.at_medians
     columns = {name: value.numbers for name, value in config.parameters.items()} | config.cases
     left = [f"{name} = {values[0]:g}" for name, values in columns.items() if len({*values}) > 1 and name not in at]
-    return f"taking the first value of each axis that is not named: {', '.join(left)}" if left else ""
+    return f"taking the first value of each axis not given: {', '.join(left)}" if left else ""
 
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
-    """`trajectory` of all cells of `chosen`."""
+    """Return the trajectories of all cells of `chosen`, as `trajectory`."""
     job = plan(chosen, also=[PATH])
     (part,), (grid,) = job.parts, job.grids
     (each,), kernel, columns = begin([part]), part.kernel, grid.columns()
@@ -199,7 +204,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
 
 
 def _described(times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
-    """The series over (trajectory, time), with their attributes, in the order of `SERIES`."""
+    """Return the series over (trajectory, time), with their attributes, in the order of `SERIES`."""
     own = {name: each for name, *each in model.series}
     specs = {"time": (u.TIME, "time t"), **SERIES, **own}
     words = {name: dataset.described(Variable("float64", *spec), system) for name, spec in specs.items()}
@@ -209,7 +214,7 @@ def _described(times: Array, series: dict[str, Array], model: Model, system: str
 
 
 def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> str:
-    """Trajectories, steps, samples and time, a line each; parameters and errors as of `trajectory`."""
+    """Describe trajectories, steps, samples and time, a line each; parameters and errors as for `trajectory`."""
     chosen = choose(config, at, samples)
     columns, integrator = chosen.grid.columns(), chosen.integrator
     steps = integrator.t_end / steps_of(integrator.method, chosen, columns)[0]
@@ -226,16 +231,16 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
 
 
 def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> Config:
-    """`config` with the cells picked by `at` as its cases, and with dopri5; `ConfigError` if they cannot be run.
+    """Return `config` with the cells selected by `at` as cases, and dopri5; raise a `ConfigError` if they cannot run.
 
-    What `at` does not name of the parameters that are distributions is at its median, or else at each of the `samples`.
+    Uncertain parameters that `at` does not name take their median, or else each of the `samples`.
     """
     config = load_config(config, {} if samples is None else {"samples": samples})
     require_simulated(config)
     config = replace(config, integrator=config.integrator.patient)
     method = METHODS.get(config.integrator.method)
     if not (method and method.takes_every_step):
-        # A step that was fixed for another method may be unstable with this one.
+        # A fixed step meant for another method may be unstable with dopri5.
         plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
         config = replace(config, integrator=plain)
     dataset.check_names(config, SERIES)
@@ -255,20 +260,20 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
 
 
 def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, Array]:
-    """The numbers asked for each parameter; `ConfigError` for the first that cannot be run."""
+    """Return the values requested for each parameter; raise a `ConfigError` for the first that cannot be run."""
     model = config.tier
     if unknown := next((name for name in at if name not in model.parameters), ""):
-        message = f"is no parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
+        message = f"is not a parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
         raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", unknown)
     return {name: np.array(numbers_of(config.table[name], value, config.unitless)) for name, value in at.items()}
 
 
 Marks = list[Array]
-"""Copies of all images at some moments of a run, each of shape (trajectories, rows)."""
+"""Copies of all state rows at some moments of a run, each of shape (trajectories, rows)."""
 
 
 def _run(cells: Cells, images: Array, after_chunk: Callable[[], None] = lambda: None) -> Marks:
-    """Run `images` to their ends, in place, and mark moments between which samples can be taken side by side."""
+    """Run `images` to their ends, in place, and mark moments between which samples can be taken in parallel."""
     marks, kernel = [images.copy()], cells.kernel
 
     def mark() -> None:
@@ -285,7 +290,7 @@ def _run(cells: Cells, images: Array, after_chunk: Callable[[], None] = lambda: 
 
 
 def _judge(cells: Cells) -> None:
-    """Give trajectories that have come to their time limit the status `SETTLED` if a sweep would end them there."""
+    """Give trajectories that reached their time limit the status `SETTLED` if a sweep would have ended them there."""
     kernel, looked, at_end = cells.kernel, cells.images.copy(), np.flatnonzero(cells.status == TIME_LIMIT)
     table = kernel.table(looked)
     table["status"][at_end], table["settles"] = RUNNING, True
@@ -295,27 +300,27 @@ def _judge(cells: Cells) -> None:
 
 
 def _times(kernel: Kernel, ends: Array, interval: float) -> Array:
-    """The times of samples of all trajectories, shape (times,): no denser than steps, and also where one ends."""
+    """Return the sample times of all trajectories, shape (times,): no denser than the steps, and including all ends."""
     last, densest = _last(kernel, ends), max(interval, kernel.table(ends)["step"].min())
     if len(ends) * last.max() > MAX_SAMPLES * densest:
         least = len(ends) * last.max() / MAX_SAMPLES
         raise fault_of(f"the samples are too many to be held in memory; give {least:.2g} or more", "every")
     times = np.union1d(np.arange(0, last.max(), densest), last)
-    different = np.diff(times, prepend=-1) > _SAME * last.max()  # not the same end, rounded in another way
+    different = np.diff(times, prepend=-1) > _SAME * last.max()  # the same end, up to rounding, is not added
     return np.asarray(times[different])
 
 
 def _last(kernel: Kernel, ends: Array) -> Array:
-    """The time of the last state of each trajectory."""
+    """Return the time of the last state of each trajectory."""
     table = kernel.table(ends)
     return np.asarray(table["step"] * table["done"])
 
 
 def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Array) -> dict[str, Array]:
-    """The series of all trajectories, each of shape (trajectories, times), NaN after the end of a trajectory.
+    """Return the series of all trajectories, each of shape (trajectories, times), NaN after the end of a trajectory.
 
-    From a mark each is stepped again, and stops at each sample before the next mark.  The steps are the sweep's own,
-    and so equal to the last bit.  All stretches between two marks are stepped side by side, on all threads.
+    Each trajectory is stepped again from a mark, and stops at each sample before the next mark. The steps are those of
+    the sweep, equal to the last bit. All stretches between two marks are stepped in parallel, on all threads.
     """
     which, at = np.nonzero(times <= _last(kernel, ends)[:, None] * (1 + _SAME))  # trajectory and time of each sample
     steps = np.floor(times[at] / kernel.table(ends)["step"][which] * (1 + _SAME)).astype(int)
@@ -356,7 +361,7 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
 
 
 def _motion(kernel: Kernel, ends: Array, states: Array, which: Array, times: Array, angles: Array) -> dict[str, Array]:
-    """Attitude and path of all trajectories, at samples in the order of trajectories and of time.
+    """Return attitude and path of all trajectories, at samples ordered by trajectory and time.
 
     Parameters
     ----------
@@ -391,7 +396,7 @@ def _motion(kernel: Kernel, ends: Array, states: Array, which: Array, times: Arr
 
 
 def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
-    """Take `images` between two steps on to their `times`, in place, by one shorter step."""
+    """Advance `images` between two steps to their `times`, in place, by one shorter step."""
     table = kernel.table(images)
     rest = times - table["done"] * table["step"]
     between = np.flatnonzero(rest > _SAME_STEP * table["step"])
@@ -401,7 +406,7 @@ def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
 
 
 def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
-    """The series at the samples `images`, each of shape (samples,); `angles` are those of `Model.turned`."""
+    """Return the series at the samples `images`, each of shape (samples,); `angles` are those of `Model.turned`."""
     model = kernel.model
     states, constants = kernel.unpack(images)
     spin, rattle, inertia = model.energy(states, constants)
@@ -420,5 +425,5 @@ def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
 
 
 def intervals(model: Model, columns: Columns) -> Array:
-    """Time between samples by default, shape (trajectories,)."""
+    """Return the default time between samples, shape (trajectories,)."""
     return np.asarray(1 / (SAMPLES_A_RADIAN * np.maximum(fastest_motion(model, columns), 0.1)))

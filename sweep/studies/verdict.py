@@ -1,7 +1,7 @@
 """Judges a fit: whether its curve misses the film by noise alone, what is known, and what the film cannot show.
 
-Residuals of a right curve are independent of each other.  So their own noise, which their third differences show
-without what varies slowly, is as large as they are, and neither their autocorrelation (Ljung and Box 1978, doi
+The residuals of a correct curve are independent of each other. Their noise, estimated from third differences that
+remove slow variations, is then as large as they are, and neither their autocorrelation (Ljung and Box 1978, doi
 10.1093/biomet/65.2.297) nor the lengths of their runs of one sign (Wald and Wolfowitz 1940) are unusual.
 """
 
@@ -21,33 +21,34 @@ from sweep.studies.intervals import variance
 from sweep.studies.misfit import UNKNOWNS, Minimum, Problem
 from sweep.units import ANGLE, SPIN, TIME, named, pretty
 
-# The chance that one of the tests calls a right curve wrong, and the lags of the autocorrelation.
+# The probability that one of the tests rejects a correct curve, and the lags of the autocorrelation.
 _CHANCE, _LAGS = 1e-3, 20
 
-# Outliers are so many times the noise off the curve and off their neighbours; of more than a share, no fit is believed.
+# Outliers are this many times the noise off the curve and off their neighbours; a fit with more than this share is
+# rejected.
 _OFF, _SHARE = 5.0, 0.03
 
-# Tails of residuals: standard errors by which their kurtosis may exceed that of a normal distribution.
+# Standard errors by which the kurtosis of the residuals may exceed that of a normal distribution.
 _TAILS = 6.0
 
-# A parameter is pressed against the end of its range if within this share of it the misfit would fall by so many
-# variances.
+# A parameter is pressed against the end of its range if the misfit would fall by this many variances within this share
+# of the range.
 _BEYOND, _PRESSED = 0.02, 2.0
 
 
-# How many of its errors a parameter may be from what was measured of it.
+# Number of errors by which a parameter may differ from its measured value.
 _FAR = 3.5
 
 
 class Verdict(NamedTuple):
-    """What to believe of a fit."""
+    """The judgement of a fit."""
 
     reasons: list[str]
-    """Why the curve is not that of the film; empty if it fits."""
+    """Reasons why the curve does not fit the film; empty if it does."""
     size: float
     """Root mean square of the residuals, in units of the film's errors."""
     noise: float
-    """What of it is noise."""
+    """The part of it that is noise."""
 
     @property
     def fits(self) -> bool:
@@ -55,12 +56,12 @@ class Verdict(NamedTuple):
 
     @property
     def because(self) -> str:
-        """The reason, in words."""
-        return "; ".join(self.reasons) or "what is left between film and curve is noise"
+        """Return the reason, as text."""
+        return "; ".join(self.reasons) or "the difference between film and curve is noise"
 
 
 def judged(problem: Problem, best: Minimum) -> Verdict:
-    """What the residuals of the best minimum, and its place, say."""
+    """Judge the residuals and the place of the best minimum."""
     kept = problem.kept
     away = best.away[: len(kept)][kept]
     size, noise = float(np.sqrt(np.mean(away**2))), own_noise(away)
@@ -70,10 +71,10 @@ def judged(problem: Problem, best: Minimum) -> Verdict:
     if (left_out := int((~kept).sum())) > _SHARE * len(kept):
         reasons.append(f"{left_out} of {len(kept)} rows are outliers")
     if ends := pressed(problem, best):
-        reasons.append(f"{_all(ends)} would go beyond the range that was searched")
+        reasons.append(f"{_all(ends)} would leave the range that was searched")
     far = np.abs(best.away[len(kept) :] / problem.scale)
     if off := [name for i, name in enumerate(np.array([*problem.free])[problem.measured]) if far[i] > _FAR]:
-        reasons.append(f"{_all(off)} would be more than {_FAR:g} errors from what was measured")
+        reasons.append(f"{_all(off)} would be more than {_FAR:g} errors from the measured value")
     return Verdict(reasons, size, noise)
 
 
@@ -82,12 +83,12 @@ def _all(names: Iterable[str]) -> str:
 
 
 def own_noise(values: Array) -> float:
-    """The standard deviation of what varies from row to row, by third differences."""
+    """Return the standard deviation of what varies from row to row, by third differences."""
     return float(np.sqrt(np.mean(np.diff(values, 3) ** 2) / 20)) if len(values) > 3 else 0.0
 
 
 def _structure(away: Array, size: float, noise: float) -> list[str]:
-    """What of the residuals is no noise."""
+    """Say which part of the residuals is not noise; return "" if all of it is."""
     if not size:
         return []
     n, lags = len(away), min(_LAGS, len(away) // 5)
@@ -107,7 +108,7 @@ def _structure(away: Array, size: float, noise: float) -> list[str]:
 
 
 def outliers(problem: Problem, best: Minimum) -> Array:
-    """Which instants count, shape (instants,): not those that are off the curve and, as much, off their neighbours."""
+    """Return the instants that count, shape (instants,): not those as far off their neighbours as off the curve."""
     away = of_film(problem, best)
     scale = min(
         stats.median_abs_deviation(away, scale="normal"),
@@ -119,7 +120,7 @@ def outliers(problem: Problem, best: Minimum) -> Array:
 
 
 def of_film(problem: Problem, best: Minimum) -> Array:
-    """The residuals of all instants, those of outliers too."""
+    """Return the residuals of all instants, including outliers."""
     curve = problem.curves(best.place[None], problem.film.time)[0]
     away = (curve - problem.film.value) / problem.film.errors
     if problem.film.what == "heading":
@@ -128,16 +129,16 @@ def of_film(problem: Problem, best: Minimum) -> Array:
 
 
 def gross(values: Array) -> Array:
-    """Which instants count before anything is fitted, shape (instants,): those not far beyond nearly all others."""
+    """Return the instants that count before a fit, shape (instants,): those not far from nearly all others."""
     low, middle, high = np.percentile(values, [2, 50, 98])
     return np.asarray((np.abs(values - middle) <= 3 * max(high - middle, middle - low)) | (high == low))
 
 
 def pressed(problem: Problem, best: Minimum, share: float = _BEYOND, fall: float = _PRESSED) -> dict[str, int]:
-    """The parameters at an end of their range, -1 or 1, beyond which the misfit would fall.
+    """Return the parameters at an end of their range, -1 or 1, beyond which the misfit would fall.
 
-    To first order, by `fall` in units of the variance within a `share` of the range.  It does not fall where the film
-    says nothing of a parameter.
+    To first order it falls by `fall`, in units of the variance, within a `share` of the range. It does not fall if the
+    film says nothing about the parameter.
     """
     slopes = 2 * best.jacobian.T @ best.away / variance(problem, best)
     ends = {n: r.ends(place, 1e-3) for (n, r), place in zip(problem.free.items(), best.place, strict=True)}
@@ -147,9 +148,9 @@ def pressed(problem: Problem, best: Minimum, share: float = _BEYOND, fall: float
 def sentences(
     problem: Problem, verdict: Verdict, values: Array, limits: Array, edge: Array, words: Sequence[str]
 ) -> str:
-    """Three sentences: how the curve fits, what is known how well, and what the film cannot show and which one would.
+    """Return three sentences: how well the curve fits, what is known how accurately, and which film would show more.
 
-    `limits` are the ends of the intervals of 95 %, shape (2, free); `edge` says which are none.
+    `limits` holds the ends of the 95 % intervals, shape (2, free); `edge` marks ends that are limits of the search.
     """
     config, names = problem.config, list(problem.free)
     unit = pretty(named(ANGLE if problem.film.what == "heading" else SPIN, config.units))
@@ -157,20 +158,20 @@ def sentences(
         _how(problem, verdict, unit),
         _known(config, names, values, limits, edge) if verdict.fits else _CAUSES,
         _unknown([name for name, each in zip(names, edge, strict=True) if each], words) if verdict.fits
-        else "The values and intervals below describe a curve that is not the film's.",
+        else "The values and intervals below describe a curve that does not match the film.",
     ])  # fmt: skip
 
 
 _CAUSES = (
-    "Check the units of the film and the measures of the body, free film_delay and film_bias, and compare laws of "
-    "friction by --laws."
+    "Check the units of the film and the dimensions of the body, try film_delay and film_bias as free parameters, and "
+    "compare laws of friction with --laws."
 )
 
 
 def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
     left = f", {counted(int((~problem.kept).sum()), 'outlier')} left out" if not problem.kept.all() else ""
     if not verdict.fits:
-        return f"The fit is not to be believed: {'; '.join(verdict.reasons)}{left}."
+        return f"The fit cannot be trusted: {'; '.join(verdict.reasons)}{left}."
     if problem.film.error is not None:
         return f"The curve fits the film: it misses it by {verdict.size:.2g} times its errors{left}."
     return (
@@ -179,43 +180,43 @@ def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
 
 
 def _known(config: Config, names: Sequence[str], values: Array, limits: Array, edge: Array) -> str:
-    """What is known, each with its interval of 95 %."""
-    told = []
+    """Describe what is known, each value with its 95 % interval."""
+    phrases = []
     for name, value, (low, high), at in zip(names, values, limits.T, edge, strict=True):
         if not at:
             words = config.described(name)["long_name"] if name in config.table else name
-            told.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
+            phrases.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
                         f"({_digits(low, high - low)} to {_digits(high, high - low)})")  # fmt: skip
-    return f"At 95 % confidence, {', '.join(told)}." if told else "It determines none of the free parameters."
+    return f"At 95 % confidence, {', '.join(phrases)}." if phrases else "It determines none of the free parameters."
 
 
 def _digits(value: float, width: float) -> str:
-    """A number with two digits of the width of its interval."""
+    """Format a number with two digits of the width of its interval."""
     digits = 2 + max(0, round(log10(abs(value) / width))) if value and width > 0 else 3
     return f"{value:.{min(digits, 8)}g}"
 
 
 def _unit(config: Config, name: str) -> str:
-    """The unit of a parameter, as figures print it, behind a space."""
+    """Return the unit of a parameter, as figures print it, after a space."""
     of_film = {"film_delay": named(TIME, config.units), "film_bias": named(SPIN, config.units)}
     found = config.described(name).get("units", "") if name in config.table else of_film[name]
     return f" {pretty(found)}" if found not in ("", "1") else ""
 
 
 def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
-    """What the film does not determine, and which film would."""
+    """Describe what the film does not determine, and which film would."""
     if not names:
-        tied = [each.partition(":")[0] for each in words if "only together" in each]
+        tied = [each.partition(":")[0] for each in words if "only in combination" in each]
         if tied:
-            return f"But {tied[0]}; measure one of them otherwise."
-        return "A film of another start would test the law of friction."
+            return f"But {tied[0]}; measure one of them independently."
+        return "A film with a different start would test the law of friction."
     which = dict.fromkeys(next((film for some, film in _FILMS.items() if name in some), _SLIPPING) for name in names)
     return f"It does not determine {_all(names)}; for that, {'; and '.join(which)}."
 
 
 _SLIPPING = "film the body as it slips and reverses: with a faster spin, or more tilt at the start"
 _FILMS: Mapping[tuple[str, ...], str] = {
-    ("sigma", "mu_viscous", "mu_rolling", "mu_spinning"): "go on filming until the body rests",
+    ("sigma", "mu_viscous", "mu_rolling", "mu_spinning"): "continue filming until the body rests",
     (
         "n0",
         "x0",
@@ -225,7 +226,7 @@ _FILMS: Mapping[tuple[str, ...], str] = {
         "omega1",
         "omega2",
         "omega3",
-    ): "begin the film as the hand lets go, at more rows a second",
-    UNKNOWNS: "film a second of rest as well",
+    ): "begin the film when the hand lets go, with more rows per second",
+    UNKNOWNS: "also film one second of rest",
     BODY: "weigh and measure the body",
 }

@@ -9,6 +9,7 @@ from support import ROOT
 from support.cli import invoke, refused
 
 import sweep
+from sweep.parameters import PARAMETERS
 from sweep.plots.quantities import check_pictures
 
 TOY = ("--mass", "30g", "--length", "12.0±0.1cm", "--width", "3 cm", "--height", "15mm", "--angle", "2.0 +- 0.5 deg")
@@ -144,9 +145,16 @@ def test_a_copied_example_loads_measures_what_it_draws_and_is_not_overwritten(na
     assert (config.name, config.grid.size > 1) == (name, True)
     check_pictures(config)
     (folder / f"{name}.yaml").write_text("mine", encoding="utf-8")
-    refused(invoke("examples", name, "--output", folder), f"{name}.yaml: exists already; choose another folder")
+    refused(invoke("examples", name, "--output", folder), f"{name}.yaml: already exists; choose another folder")
     assert (folder / f"{name}.yaml").read_text(encoding="utf-8") == "mine"
 
 
 def test_an_unknown_example_is_one_line() -> None:
     refused(invoke("examples", "woden"), "examples woden: no such example (did you mean wooden?)")
+
+
+def test_parameters_are_listed_within_a_line_and_without_huge_bounds() -> None:
+    said = invoke("parameters").stdout
+    assert [line.split()[0] for line in said.splitlines() if line[0] != " "] == [p.path for p in PARAMETERS.values()]
+    assert max(map(len, said.splitlines())) <= 100
+    assert "e+" not in said

@@ -172,6 +172,7 @@ def test_a_dataset_that_was_cut_says_what_it_lacks(cut: str, tmp_path: Path, mon
 
 FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "title": (lambda d: d.assign_attrs(title=[1, 2]), "the attribute title is not text; another program"),
+    "verdict": (lambda d: d.assign_attrs(verdict=3), "the attribute verdict is not text; another program"),
     "time": (lambda d: d.assign_attrs(wall_time="x"), "the attribute wall_time is not a number; another program"),
     "words": (lambda d: d.assign(step=d.step.astype(str)), "the variable step holds no numbers; another program"),
     "shape": (lambda d: d.assign(step=d.step.isel(mu=0)), "the variable step is not over the axes of status; another"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write
-from support.cli import invoke
+from support.cli import invoke, refused
 
 import sweep
 from sweep.config import ConfigError
@@ -32,7 +32,7 @@ def file(tmp_path: Path) -> Path:
         ("--var status --limits 0..5", "limits: status is drawn as categories, which have no scale; leave them out"),
         ("--sel n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
         ("--sel n0=5", "sel: n0 = 5 is far from all its values, 0.02 to 0.05; choose one of them"),
-        ("--sel n0=0.02 --sel n0=0.05", "--sel n0=0.05: n0 has another value already; draw one picture for each"),
+        ("--sel n0=0.02 --sel n0=0.05", "--sel n0=0.05: n0 is given twice; draw one picture for each value"),
         ("--var reversals_predict", "no variable reversals_predict (did you mean reversals_predicted?); choose"),
     ],
 )
@@ -78,12 +78,15 @@ def test_the_time_between_samples_is_a_positive_number(every: Any) -> None:
         sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20, every=every)
 
 
-TAKEN = "taking the first value of each axis that is not named: "
+TAKEN = "taking the first value of each axis not given: "
 
 
 def test_a_trajectory_says_which_values_it_takes(write: Write, tmp_path: Path) -> None:
     result = invoke("trajectory", write(TEXT), "--at", "mu=60", "--output", tmp_path)
     assert f"{TAKEN}n0 = 0.02\n" in result.stderr
+    refused(
+        invoke("trajectory", write(TEXT), "--at", "mu=-1", "--output", tmp_path), "--at mu: must be a finite number"
+    )
     assert (
         TAKEN not in invoke("trajectory", write(TEXT), "--at", "mu=60", "--at", "n0=0.05", "--output", tmp_path).stderr
     )
@@ -110,9 +113,10 @@ def test_cells_are_run_again_only_of_a_run_that_is_there(write: Write) -> None:
 
 
 def summary(**variables: Any) -> str:
-    from sweep.results.summary import describe
+    from sweep.results.summary import accuracy, describe
 
-    return describe(xr.Dataset(variables))
+    dataset = xr.Dataset(variables)
+    return "\n".join([describe(dataset), *accuracy(dataset)])
 
 
 def test_words_agree_with_their_number() -> None:
@@ -120,16 +124,21 @@ def test_words_agree_with_their_number() -> None:
     assert summary(**one) == "1 cell: 1 time_limit\nstep: 0.5 to 0.5, set by accuracy in 1 cell"
 
 
-def test_cells_that_miss_the_tolerance_do_not_set_a_step() -> None:
+def test_one_line_says_the_result_and_the_next_what_needs_a_look() -> None:
+    """Cells that miss the tolerance do not count for the rule that set the step."""
     rules = {"status": ("mu", np.full(4, 2, "int8")), "step": ("mu", [1.0, 2, 3, 4]), "step_rule": ("mu", [1, 4, 4, 3])}
-    assert summary(**rules).splitlines()[1:] == [
+    counts = {"reversals": ("mu", [1, 2, 2, 5]), "reversals_predicted": ("mu", [1, 2, 3, 1])}
+    errors = {"spin_error": ("mu", [1e-9, 2e-3, np.nan, 1e-9]), "decided": ("mu", [1, 0, 1, 1])}
+    assert summary(**rules, **counts, **errors).splitlines() == [
+        "4 cells (mu 4): 4 time_limit; 1 to 5 reversals, as predicted in 50.0% of the cells, within one in 75.0%",
+        "2 of 4 cells miss the tolerance: spin errors up to 2.0e-03; 1 count is uncertain",
+        "spin error: median 1.0e-09, largest 2.0e-03, as estimated",
         "step: 1 to 4, set by accuracy in 1 cell, repeat in 1 cell",
-        "tolerance: 2 of 4 cells miss the requested tolerance",
     ]
 
 
 def test_a_status_that_was_averaged_is_no_status() -> None:
-    assert summary(status=("mu", [1.5, 2.0])) == "no status of single cells: averaged"
+    assert summary(status=("mu", [1.5, 2.0])) == "no status of individual cells: averaged"
 
 
 def test_a_probability_that_nobody_knows_is_no_number() -> None:
@@ -140,8 +149,8 @@ def test_a_probability_that_nobody_knows_is_no_number() -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "said"),
-    [(0.0, "0 s"), (5e-5, "under 1 ms"), (0.351, "0.35 s"), (119, "120 s"), (3400, "57 min"), (12000, "3.3 h"),
-     (1e7, "120 days")],
+    [(0.0, "0 s"), (5e-5, "under 1 ms"), (0.351, "0.35 s"), (119, "120 s"), (200, "3 min 20 s"), (3400, "57 min"),
+     (4800, "1 h 20 min"), (3600, "1 h"), (90000, "25 h"), (200000, "2 days 8 h"), (1e7, "116 days")],
 )  # fmt: skip
 def test_a_time_is_said_as_people_say_it(seconds: float, said: str) -> None:
     from sweep.faults import duration

@@ -78,7 +78,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     "pure": (stone(("mu: 0.5", "mu: 0.5 s/m")), "friction.mu: is a pure number here; leave out s/m"),
     "no unit": (stone(("law: coulomb", "law: stribeck"), ("regularisation: tanh", "mu_static: 0.4 m")), "not '0.4 m'"),
     "other": (stone(("c: 0.02", "c: 20 g")), "not '20 g'; its unit must be m, cm, mm, in or ft"),
-    "error": (stone(("c: 0.02", "c: 20+-1 mm")), "not '20+-1 mm'; an error belongs into {normal: [value, error]}"),
+    "error": (stone(("c: 0.02", "c: 20+-1 mm")), "not '20+-1 mm'; write an error as {normal: [value, error]}"),
     "thousands": (stone(("c: 0.02", "c: '1,250 mm'")), "not '1,250 mm'; write 1.250 mm or 1250 mm"),
     "comma": (
         small("[40, 60]}", "1,5}"),
@@ -94,7 +94,7 @@ REFUSED: dict[str, tuple[str, str]] = {
     },
     "span": (
         stone(("c: 0.02", "c: 20cm..30 cm")),
-        "; a range is written {start: 20cm, stop: 30 cm, num: 41} and needs",
+        "; a range is written {start: 20cm, stop: 30 cm, num: 41}, with the number",
     ),
 }
 
@@ -133,7 +133,7 @@ def test_tables_of_cases_have_units_and_any_separator(table: str, write: Write, 
     [
         ("a (kg)\n20\n10\n", "cells.csv:1:1: a: is in 'kg'; its unit must be m, cm, mm, in or ft"),
         ("a (cm)\n20\n10\n", "cases.a: is in c here; give the number without cm, or set units: SI"),
-        ("a,mu\n1,5,60\n", "cells.csv:2: 3 values, but 2 columns in line 1, with commas between them; put semicolons"),
+        ("a,mu\n1,5,60\n", "cells.csv:2: 3 values, but 2 columns in line 1, with commas between them; use semicolons"),
         ("a;mu\n15\n", "cells.csv:2: 1 values, but 2 columns in line 1, with semicolons between them"),
     ],
 )

@@ -73,7 +73,7 @@ GROWN = {
     "mass": (SCENE, SCENE.replace("mass: 1.0", "mass: [0.5, 1.0]"), "2 of 4"),
     "roll": (SCENE, SCENE.replace("roll: 0.5 deg", "roll: [0.5 deg, 1 deg]"), "2 of 4"),
 }
-"""A configuration, what it becomes, and how many cells are taken over."""
+"""A configuration, what it becomes, and how many cells are reused."""
 
 
 @pytest.mark.parametrize(("first", "later", "taken"), GROWN.values(), ids=GROWN)
@@ -81,7 +81,7 @@ def test_a_grown_run_is_the_run_of_all_at_once(
     write: Write, tmp_path: Path, first: str, later: str, taken: str
 ) -> None:
     found, (note,) = grown(write, tmp_path / "out", first, later)
-    assert re.match("no cell of the run" if taken == "no" else f"{taken} cells are taken over", note)
+    assert re.match("no cell of the run" if taken == "no" else f"{taken} cells are reused", note)
     assert found.attrs.get("taken_over", note) in note
     same_numbers(found, sweep.run(write(later)))
 
@@ -108,7 +108,7 @@ def test_what_is_taken_over_is_not_computed_again(write: Write, tmp_path: Path) 
 
 @pytest.mark.parametrize("t_end", [3037, 6000])
 def test_the_time_limit_leaves_no_trace(write: Write, t_end: int) -> None:
-    """Only those cells are taken over that do not know of the limit; another number of steps is another run."""
+    """Only cells that do not depend on the limit are reused; another number of steps is another run."""
     short, config = sweep.run(write(MORE)), sweep.load_config(write(MORE.replace("3000", str(t_end))))
     cells = taken_over(config, short, None).cells
     taken = np.flatnonzero(cells >= 0)
@@ -191,7 +191,7 @@ def test_a_part_of_a_dataset_is_no_complete_run(write: Write, tmp_path: Path) ->
     there, _ = grown(write, tmp_path / "out", FEWER)
     there.isel(mu=[0]).to_netcdf(tmp_path / "out" / "small.nc")
     found, notes = grown(write, tmp_path / "out", FEWER)
-    assert notes[0].startswith("6 of 12 cells are taken over")
+    assert notes[0].startswith("6 of 12 cells are reused")
     same_numbers(found, there)
 
 
@@ -218,12 +218,12 @@ def test_rerun_computes_just_those_cells(write: Write, tmp_path: Path) -> None:
     assert 0 < limit.sum() < limit.size
     later = MORE.replace("3000", "5000, tolerance: 1e-7")
     found, (note,) = grown(write, tmp_path / "out", later, rerun="limit")
-    assert note.startswith(f"{int((~limit).sum())} of 24 cells are taken over")
+    assert note.startswith(f"{int((~limit).sum())} of 24 cells are reused")
     expected = sweep.run(write(later))
     for name in ("reversals", "spin_final", "t_stop", "step", "status"):
         xr.testing.assert_equal(found[name], xr.where(limit, expected[name], short[name]))
     # Settings differ from cell to cell now: no other run may add to these.
-    with pytest.raises(StoreError, match="computed again"):
+    with pytest.raises(StoreError, match="some cells were repeated"):
         grown(write, tmp_path / "out", later.replace("[40, 50", "[30, 40, 50"))
 
 
@@ -233,7 +233,7 @@ def test_rerun_of_failed_cells(write: Write, tmp_path: Path) -> None:
     failed = np.isin(short["status"], (LIFT_OFF,))
     assert 0 < failed.sum() < failed.size
     found, (note,) = grown(write, tmp_path / "out", violent, rerun="failed", tolerance=1e-4)
-    assert note.startswith(f"{int((~failed).sum())} of 12 cells are taken over")
+    assert note.startswith(f"{int((~failed).sum())} of 12 cells are reused")
     np.testing.assert_array_equal(found["status"].values[~failed], short["status"].values[~failed])
     assert (found["step"].values != short["step"].values)[failed].all()
 

@@ -318,7 +318,7 @@ def test_two_processes_at_once(runs: Runs, undisturbed: dict[str, bytes]) -> Non
         watch.look()
     os.kill(first.pid, signal.SIGSTOP)  # at work for as long as it takes
     for arguments in ((), ("--fresh",)):
-        refused(runs.finish("--quiet", *arguments), f"{runs.out / 'small'}: another run is at work there")
+        refused(runs.finish("--quiet", *arguments), f"{runs.out / 'small'}: in use by another run")
     assert runs.finish("--quiet", "--set", "name=other", "--set", "t_end=5") == (0, "")
     for left in runs.out.glob("other*"):
         left.unlink()

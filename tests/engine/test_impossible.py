@@ -16,7 +16,7 @@ from sweep.engine import local
 from sweep.engine.estimate import estimate
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.plots.marks import BLANK, legend, marks
-from sweep.results.summary import describe, failed_fraction
+from sweep.results.summary import accuracy, describe, failed_fraction
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -57,7 +57,7 @@ def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> Non
     words = describe(edge)
     assert "8 impossible" in words
     assert "2 cells, upright rest is not stable" in words
-    assert "set by accuracy in 10 cells" in words
+    assert "set by accuracy in 10 cells" in "".join(accuracy(edge))
 
 
 def test_neighbours_do_not_notice(edge: xr.Dataset, write: Write) -> None:
@@ -91,7 +91,7 @@ def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_pa
     reporter = Heard()
     found = swept(write(TEXT), tmp_path, reporter=reporter)
     same_numbers(found, edge)
-    assert "12 of 18 cells are taken over" in reporter.notes[0]
+    assert "12 of 18 cells are reused" in reporter.notes[0]
     assert found.attrs["impossible"] == edge.attrs["impossible"]
 
 
@@ -114,9 +114,9 @@ def test_a_refined_map_infers_no_body_to_be_impossible(change: dict[str, Any]) -
 
 def test_parts_of_a_run_tell_what_there_is(edge: xr.Dataset) -> None:
     """Even if no body of them can be."""
-    words = describe(edge.sel(b=0.9, offset=[1.0]))
-    assert "2 impossible" in words
-    assert "step:" not in words
+    part = edge.sel(b=0.9, offset=[1.0])
+    assert "2 impossible" in describe(part)
+    assert "step:" not in "".join(accuracy(part))
 
 
 def test_an_estimate_of_cells_none_of_which_can_be() -> None:

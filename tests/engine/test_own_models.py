@@ -96,7 +96,7 @@ def test_a_larger_run_of_the_same_file_takes_its_cells_over(few: xr.Dataset, fol
     reporter = Heard()
     more = FEW | {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}
     larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", reporter=reporter, **more)
-    assert any(note.startswith("12 of 15 cells are taken over") for note in reporter.notes)
+    assert any(note.startswith("12 of 15 cells are reused") for note in reporter.notes)
     assert reporter.notes[0].startswith("running the code of ")
     same_numbers(larger.sel(torque=few["torque"]), few)
 

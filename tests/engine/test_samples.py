@@ -115,7 +115,7 @@ def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path) -> None:
     more, reporter = SCENE.replace("32", "48"), Heard()
     sweep.run(write(SCENE), tmp_path)
     found = sweep.run(write(more), tmp_path, reporter=reporter)
-    assert reporter.notes[0].startswith("64 of 96 cells are taken over")
+    assert reporter.notes[0].startswith("64 of 96 cells are reused")
     same_numbers(found, sweep.run(write(more)))
     assert sweep.load_config(write(found.attrs["config"])).samples == 48
 
@@ -163,7 +163,7 @@ def test_tiles_cells_and_bodies_of_a_grid_with_a_table(
 
 @pytest.mark.parametrize("verb", ["critical", "boundaries"])
 def test_a_search_asks_for_numbers(write: Write, verb: str) -> None:
-    refused(invoke(verb, write(SCENE)), "start.n0: is a distribution, of which run draws samples")
+    refused(invoke(verb, write(SCENE)), "start.n0: is a distribution, which only run can sample")
 
 
 def test_a_trajectory_begins_at_the_medians(write: Write) -> None:

@@ -41,7 +41,7 @@ def setup(source: Source, folder: Path) -> Setup:
 def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweep.models.user.loading.load", lambda origin: pytest.fail(f"ran {origin.place}"))
     assert usable(source) is None
-    with pytest.raises(ConfigError, match="code of a user, which is not run for a configuration that comes from a da"):
+    with pytest.raises(ConfigError, match="refusing to run user code named inside a da"):
         Setup(source)
     why = f"Its model is code of a user, {folder / 'pendulum.py'}, and runs only if you name it: "
     assert why_still(source) == f"{why}sweep explore FILE --model MODEL."

@@ -148,7 +148,7 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
     times = np.arange(5 * film.MOST_ROWS) * 1e-4
     found = film.read(write(table("time,spin", times, np.cos(times)), "film.csv"))
     assert len(found.time) == film.MOST_ROWS
-    assert found.why == "all but each 5th of 100000 rows, as more would hardly add knowledge"
+    assert found.why == "all but one in 5 of 100000 rows, as more would hardly add information"
     np.testing.assert_allclose(found.value, np.cos(found.time), rtol=1e-12)
     turned = film.read(write(table("time,heading", times, np.mod(1e4 * times, 2 * np.pi)), "film.csv"))
     np.testing.assert_allclose(turned.value, 1e4 * turned.time, rtol=1e-9)
@@ -159,24 +159,24 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
     [
         ("time\n1\n2\n", ":1:", "'spin (rad/s)', 'gyroscope z (rad/s)' or 'heading (deg)'; it has time"),
         ("spin (m/s),time\n1,2\n", ":1:", "spin: is in 'm/s'; its unit must be rad/s, 1/s, deg/s, °/s or rpm"),
-        (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time goes back; sort the rows by time"),
-        ("t,spin\n\n0,1\n2,1\n1,1\n", ":5:", "the time goes back; sort the rows by time"),
+        (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time decreases; sort the rows by time"),
+        ("t,spin\n\n0,1\n2,1\n1,1\n", ":5:", "the time decreases; sort the rows by time"),
         (table("t,spin (1/s),error (rad)", TIMES, SPINS, 1 + TIMES), ":1:", "error: is in 'rad'; its unit must be"),
         (table("t,spin,error", TIMES, SPINS, TIMES), ":2:", "the error must be a number > 0"),
         (table("t,spin", TIMES[:5], SPINS[:5]), ":", "has 5 rows with a time and a spin; a fit needs at least 8"),
-        (table("t,spin", 0 * TIMES, SPINS), ":", "a fit needs at least 8, not all at one time"),
+        (table("t,spin", 0 * TIMES, SPINS), ":", "a fit needs at least 8 rows, at different times"),
         ("", ":", "empty; its first line has to name the columns"),
-        ("t,spin\n0,1\n1,2,3\n", ":3:", "3 values, but 2 columns in line 1, with commas between them; put semicolons"),
-        (table("t,spin", TIMES, TIMES, SPINS), ":2:", "with commas between them; so it is in 20 of 20 rows; put semi"),
+        ("t,spin\n0,1\n1,2,3\n", ":3:", "3 values, but 2 columns in line 1, with commas between them; use semicolons"),
+        (table("t,spin", TIMES, TIMES, SPINS), ":2:", "with commas between them; 20 of 20 rows are like this; use"),
         ("\0\0\1", ":", "film.csv"),
         ("t n\n0 1\n", ":1:", "it has t n, with no commas, semicolons or tabs in the line"),
         (table("t,n\ns,m/s", TIMES, SPINS), ":2:", "n: is in 'm/s'; its unit must be rad/s"),
         (table("t,n (rad/s)\ns,deg/s", TIMES, SPINS), ":2:", "n: is in 'rad/s' in line 1, and in 'deg/s' here; give"),
         (quoted("-1,442"), ":2:", "n: '-1,442' may be -1.442 or -1442; write one of these, or semicolons"),
-        (quoted("-1,442", "0.5"), ":1:", "n: has '-1,442' and '0.5'; write decimal points alone"),
-        (table("t,n", TIMES, SPINS).replace("1.3,0.26", "1.3,(0.26)"), ":15:", "is no number, as are 1 of 20 cells"),
-        (table("t,n", TIMES, SPINS).replace(",0.", ",~0."), ":3:", "is no number, as are 15 of 20 cells; write"),
-        (table("t,n", TIMES, SPINS).replace("\n1.", "\nlost 1."), ":13:", "as are 9 of 20 cells; write numbers alone"),
+        (quoted("-1,442", "0.5"), ":1:", "n: has '-1,442' and '0.5'; use decimal points only"),
+        (table("t,n", TIMES, SPINS).replace("1.3,0.26", "1.3,(0.26)"), ":15:", "is not a number (1 of 20 cells)"),
+        (table("t,n", TIMES, SPINS).replace(",0.", ",~0."), ":3:", "is not a number (15 of 20 cells); write"),
+        (table("t,n", TIMES, SPINS).replace("\n1.", "\nlost 1."), ":13:", "(9 of 20 cells); write numbers only"),
     ],
 )  # fmt: skip
 def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, line: str, words: str) -> None:

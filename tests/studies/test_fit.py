@@ -156,7 +156,7 @@ def test_what_the_film_does_not_tell_is_said(write: Write) -> None:
     times = np.arange(0, 50, 0.5)
     film = Film(times, noisy(np.full(len(times), 0.05)))
     found = sweep.fit(write(SCENE), film, ["mu", "n0"], x0=0.0, y0=0.0)
-    assert found.attrs["undetermined"].startswith("the film hardly determines mu: the interval")
+    assert found.attrs["undetermined"].startswith("the film hardly determines mu: the 95 %")
     assert [found[f"{side}_95"].values[0] for side in ("lower", "upper")] == pytest.approx([30, 100])
     assert abs(found.value.values[1] - 0.05) < 1e-3
 
@@ -166,7 +166,7 @@ def test_a_steady_spin_cannot_be_told_from_the_bias_of_a_gyroscope(write: Write)
     film = Film(times, noisy(np.full(len(times), 5.3), 0.02), what="gyroscope")
     upright = {"n0": [4.5, 5.5], "x0": 0.0, "y0": 0.0, "mu": 0.3, "speed": 0.5}
     found = sweep.fit(write(STONE), film, ["n0", "film_bias"], **upright)
-    assert "film_bias and n0 are known only together" in found.attrs["undetermined"]
+    assert "film_bias and n0 are known only in combination" in found.attrs["undetermined"]
     assert found.value.sum().item() == pytest.approx(5.3, abs=0.01)
     assert "film_bias" not in found.attrs["config"]
     assert found.seen.attrs["long_name"] == "angular velocity about the sensor's axis"
@@ -198,7 +198,7 @@ def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
     how, known, unknown = found.attrs["verdict"].splitlines()
     assert how == "The curve fits the film: it misses it by 0.00092 √(g/c) (root mean square), which is noise."
     assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.0519 .*\)\.", known)
-    assert unknown == "A film of another start would test the law of friction."
+    assert unknown == "A film with a different start would test the law of friction."
     assert found.edge.values.tolist() == [0, 0]
     assert not found.outlier.any()
 
@@ -207,8 +207,8 @@ def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
     ("given", "reason"),
     [
         ({"delta": 0.04}, "times its noise, and stays on one side of it for many rows"),
-        ({"mu": [30.0, 48.0]}, "mu would go beyond the range that was searched"),
-        ({"b": {"normal": [3.2, 0.02]}}, "b would be more than 3.5 errors from what was measured"),
+        ({"mu": [30.0, 48.0]}, "mu would leave the range that was searched"),
+        ({"b": {"normal": [3.2, 0.02]}}, "b would be more than 3.5 errors from the measured value"),
     ],
     ids=str,
 )
@@ -219,7 +219,7 @@ def test_a_wrong_curve_is_called_wrong(
     found = sweep.fit(write(SCENE), Film(times, spins), ["mu", "n0"], **given)
     assert found.attrs["fits"] == 0
     assert reason in found.attrs["fits_because"]
-    assert found.attrs["verdict"].startswith("The fit is not to be believed: ")
+    assert found.attrs["verdict"].startswith("The fit cannot be trusted: ")
     if given.keys() == {"mu"}:
         assert found.edge.values.tolist() == [2, 0]
 
@@ -279,21 +279,25 @@ def test_film_and_fit_are_shown_side_by_side(found: xr.Dataset) -> None:
 @pytest.mark.parametrize("laws", [(), ("viscous", "coulomb")])
 def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: tuple[str, ...]) -> None:
     film = Film(np.arange(3.0), np.array([0.05, np.nan, 0.05]))
-    with pytest.raises(ConfigError, match="no number; leave out such instants"):
+    with pytest.raises(ConfigError, match="not a number; leave out that instant"):
         sweep.fit(write(SCENE), film, ["mu"], n0=0.05, laws=laws, progress=False)
 
 
 @pytest.mark.parametrize(
     ("free", "overrides", "words"),
     [
-        (["muu"], {}, "muu is no parameter of the slip model (did you mean mu?); free may be a, b"),
-        ([], {}, "name the free parameters"),
-        (["n0"], {}, "has several values; free it, or give one"),
-        (["mu", "n0", "a"], {"x0": 5.0}, "what is free reaches too far: start point off the ellipsoid at x0=5"),
+        (["muu"], {}, "muu is not a parameter of the slip model (did you mean mu?); these can be free: a, b"),
+        ([], {}, "name at least one free parameter"),
+        (["n0"], {}, "has several values; make it free, or give one value"),
+        (
+            ["mu", "n0", "a"],
+            {"x0": 5.0},
+            "the range of a free parameter is too wide: start point off the ellipsoid at x0",
+        ),
         (["mu", "n0", "x0", "y0", "a", "b", "delta", "film_delay", "film_bias"], {}, "9 parameters are free"),
         (["mu", "n0", "delta"], {"delta": 0.0}, "give the ends of its range as two values"),
         (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
-        (["mu"], {"laws": ["viscuos"]}, "viscuos is no law of friction (did you mean viscous?); choose from viscous"),
+        (["mu"], {"laws": ["viscuos"]}, "viscuos is not a law of friction (did you mean viscous?); choose from vis"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused(write: Write, free: list[str], overrides: dict[str, Any], words: str) -> None:
@@ -331,7 +335,7 @@ def test_a_film_is_attributed_to_its_law(of_laws: xr.Dataset) -> None:
     assert of_laws.law.values.tolist() == ["viscous", "coulomb-sqrt"]
     assert of_laws.number_free.values.tolist() == [2, 2]
     assert of_laws.weight.sel(law="coulomb-sqrt").item() > 0.9999
-    assert "viscous is ruled out beside coulomb-sqrt: Akaike's criteria differ by" in of_laws.attrs["undetermined"]
+    assert "viscous is ruled out in favour of coulomb-sqrt: Akaike's criteria" in of_laws.attrs["undetermined"]
     true = of_laws.sel(law="coulomb-sqrt", parameter="mu")
     assert true.lower_95.item() < 0.3 < true.upper_95.item()
     assert true.chi_square.item() == pytest.approx(len(of_laws.time) - 2)
@@ -344,8 +348,8 @@ def test_laws_that_cannot_be_told_apart_are_said(write: Write) -> None:
     config = write(VISCOUS)
     found = sweep.fit(config, film_of(config, "viscous", SHAKY), ["mu", "n0"], laws=["viscous", "coulomb-sqrt"])
     words = found.attrs["undetermined"]
-    assert "viscous and coulomb-sqrt cannot be told apart by this film" in words
-    assert "coulomb-sqrt: speed and mu are known only together" in words
+    assert "viscous and coulomb-sqrt cannot be distinguished by this film" in words
+    assert "coulomb-sqrt: speed and mu are known only in combination" in words
     assert "misses the film" not in words
     assert found.number_free.values.tolist() == [2, 3]
     assert np.isnan(found.value.sel(law="viscous", parameter="speed"))

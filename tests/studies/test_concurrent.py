@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from sweep.studies.together import together
+from sweep.studies.concurrent import run_concurrently
 
 Ask = Callable[[int], int]
 
@@ -30,7 +30,8 @@ def total(ask: Ask, first: int, questions: int) -> int:
 def test_what_is_asked_at_the_same_time_is_one_batch_in_the_order_of_the_searches() -> None:
     for _ in range(20):
         answer = Squares()
-        assert together([partial(total, first=10 * k, questions=k) for k in (3, 0, 1)], answer) == [2885, 0, 100]
+        searches = [partial(total, first=10 * k, questions=k) for k in (3, 0, 1)]
+        assert run_concurrently(searches, answer) == [2885, 0, 100]
         assert answer.batches == [[30, 10], [31], [32]]
 
 
@@ -38,7 +39,7 @@ def test_others_do_not_go_on_when_one_was_enough() -> None:
     for _ in range(20):
         answer = Squares()
         searches = [partial(total, first=k, questions=k) for k in (5, 2, 2, 4)]
-        assert together(searches, answer, lambda found: found == 13) == [13, 13]
+        assert run_concurrently(searches, answer, lambda found: found == 13) == [13, 13]
         assert answer.batches == [[5, 2, 2, 4], [6, 3, 3, 5]]
 
 
@@ -47,7 +48,7 @@ def test_a_fault_in_a_search_is_raised_when_the_others_have_ended() -> None:
         raise ZeroDivisionError(ask(3))
 
     with pytest.raises(ZeroDivisionError, match="9"):
-        together([fault, partial(total, first=1, questions=3)], Squares())
+        run_concurrently([fault, partial(total, first=1, questions=3)], Squares())
 
 
 @pytest.mark.parametrize("fault", [ZeroDivisionError, KeyboardInterrupt])
@@ -58,4 +59,4 @@ def test_a_fault_in_an_answer_ends_all_searches(fault: type[BaseException]) -> N
         return numbers
 
     with pytest.raises(fault):
-        together([partial(total, first=k, questions=3) for k in range(3)], answer)
+        run_concurrently([partial(total, first=k, questions=3) for k in range(3)], answer)

@@ -1,4 +1,4 @@
-"""Keeps what a study finds in a folder, as a run keeps its results: with a checkpoint, a dataset and a picture."""
+"""Keeps the results of a study in a folder, as a run does: with a checkpoint, a dataset and a picture."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ if TYPE_CHECKING:
 
 
 class Task(NamedTuple):
-    """A study that is asked for."""
+    """The description of a study to carry out."""
 
     config: Config
     verb: str
-    """Its command, after which its files and its module in `sweep.studies` are named."""
+    """Its command, which names its files and its module in `sweep.studies`."""
     settings: str
-    """Its own settings, in words."""
+    """Its own settings, as text."""
     make: Callable[[Config, Store], Whole]
 
 
 @deferred()
-def kept(
+def run_study(
     task: Task, output: str | Path | None, *, fresh: bool, reporter: Reporter, client: Client | str | None
 ) -> xr.Dataset:
-    """The dataset that a study finds, or what an earlier one of the same identity has left in the folder `output`."""
+    """Return the dataset of a study, computed now or left in the folder `output` by an earlier identical one."""
     config, verb, settings, make = task
     run = identify(config)
     identity = replace(run, config=f"{run.config}# {settings}\n", config_hash=f"{run.config_hash}-{settings}")
@@ -65,13 +65,13 @@ def kept(
             require_same(files.dataset, found, identity)
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
-            files.picture.unlink(missing_ok=True)  # of a dataset that is gone
+            files.picture.unlink(missing_ok=True)  # its dataset is gone
             store = Checkpoint(files.checkpoint, identity, reporter.note)
             netcdf.write(files.dataset, search(store, there))
         files.discard_checkpoint()
         result = netcdf.open_dataset(files.dataset)
         if not files.picture.exists():
-            from sweep.plots import picture  # matplotlib takes a third of the time of `import sweep`
+            from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
 
             picture.plot(result, output=files.picture)
     return result

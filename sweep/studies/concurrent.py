@@ -1,6 +1,6 @@
-"""Runs several searches side by side, and answers in one batch what they ask at the same time.
+"""Runs several searches in parallel, and answers their simultaneous requests in one batch.
 
-A minimiser asks for a few trajectories, and goes on when it knows them.  Alone it leaves most lanes and threads idle.
+A minimiser asks for a few trajectories and waits for them. On its own it leaves most lanes and threads idle.
 """
 
 from __future__ import annotations
@@ -15,23 +15,23 @@ Answer = TypeVar("Answer")
 Found = TypeVar("Found")
 
 
-def together(
+def run_concurrently(
     searches: Sequence[Callable[[Callable[[Question], Answer]], Found]],
     answer: Callable[[list[Question]], Iterable[Answer]],
     enough: Callable[[Found], bool] = lambda _: False,
 ) -> list[Found]:
-    """What the searches return, in their order, without those that have not ended when one of the others was `enough`.
+    """Return the results of the searches, in order, except those still running when another result was `enough`.
 
     Parameters
     ----------
-    searches : each is called with a function that answers its questions, in a thread of its own
-    answer : called in this thread with a question of every search that goes on, in their order, so that the same
-        searches always ask the same batches
+    searches : each is called in its own thread, with a function that answers its requests
+    answer : called in this thread with one request of every running search, in order, so that the same searches always
+        give the same batches
 
     Raises
     ------
     Exception
-        What `answer` or a search has raised; other searches end at their next question.
+        Whatever `answer` or a search raised; other searches end at their next request.
     """
     asked: SimpleQueue[tuple[int, Any, Future[Answer] | None]] = SimpleQueue()
     found: dict[int, Found] = {}
@@ -63,8 +63,8 @@ def together(
                     break
                 pairs = [waiting[k] for k in sorted(waiting)]
                 answers = [*answer([question for question, _ in pairs])]
-                for (_, reply), told in zip(pairs, answers, strict=True):
-                    reply.set_result(told)
+                for (_, reply), answered in zip(pairs, answers, strict=True):
+                    reply.set_result(answered)
                 waiting.clear()
         finally:
             for _, reply in waiting.values():
