@@ -19,6 +19,7 @@ from sweep.faults import counted, either
 from sweep.grid import BODY, Array
 from sweep.studies.intervals import variance
 from sweep.studies.misfit import UNKNOWNS, Minimum, Problem
+from sweep.studies.ranges import of_film as ranges_of_film
 from sweep.units import ANGLE, SPIN, TIME, named, pretty
 
 # The chance that one of the tests calls a right curve wrong, and the lags of the autocorrelation.
@@ -145,26 +146,38 @@ def pressed(problem: Problem, best: Minimum, share: float = _BEYOND, fall: float
 
 
 def sentences(
-    problem: Problem, verdict: Verdict, values: Array, limits: Array, edge: Array, words: Sequence[str]
+    problem: Problem,
+    verdict: Verdict,
+    values: Array,
+    limits: Array,
+    edge: Array,
+    words: Sequence[str],
+    *,
+    compared: bool,
 ) -> str:
     """Three sentences: how the curve fits, what is known how well, and what the film cannot show and which one would.
 
-    `limits` are the ends of the intervals of 95 %, shape (2, free); `edge` says which are none.
+    `limits` are the ends of the intervals of 95 %, shape (2, free); `edge` says which are none; laws of friction may
+    have been `compared`.
     """
     config, names = problem.config, list(problem.free)
     unit = pretty(named(ANGLE if problem.film.what == "heading" else SPIN, config.units))
     return "\n".join([
         _how(problem, verdict, unit),
-        _known(config, names, values, limits, edge) if verdict.fits else _CAUSES,
+        _known(config, names, values, limits, edge) if verdict.fits else _causes(problem, compared),
         _unknown([name for name, each in zip(names, edge, strict=True) if each], words) if verdict.fits
         else "The values and intervals below describe a curve that is not the film's.",
     ])  # fmt: skip
 
 
-_CAUSES = (
-    "Check the units of the film and the measures of the body, free film_delay and film_bias, and compare laws of "
-    "friction by --laws."
-)
+def _causes(problem: Problem, compared: bool) -> str:
+    """Say what to check where the curve does not fit the film."""
+    words = "Check the units of the film and the dimensions of the body"
+    if untried := [name for name in ranges_of_film(problem.film) if name not in problem.free]:
+        words += f"; try {_all(untried)} as free parameter{'s' * (len(untried) > 1)}"
+    if problem.config.model == "slip" and not (compared or problem.config.origin):
+        words += "; compare laws of friction with --laws, because this fit tried one law only"
+    return f"{words}."
 
 
 def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
