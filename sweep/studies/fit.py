@@ -95,7 +95,11 @@ def fit(
         raise ConfigError([config.fault(("start", "x0"), f"what is free reaches too far: {off}")])
     with blamed(config.origin):
         problem, minima = _found(Problem(config, film, sought, _countable(film)), note)
-        best, limits, rugged = intervals(problem, minima, note)
+        found, limits, rugged = intervals(problem, minima, note)
+        (best,) = _turned(problem, [found])
+        if best is not found:
+            at = _start(problem)
+            limits[..., at] = 1 - limits[:, ::-1][..., at]
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
     return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, compared=compared)
 
@@ -150,12 +154,10 @@ def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list
 
 def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
     """The minima, of which half a turn may make others: the best as the configuration starts, all others beside it."""
-    names = ranges.mirrored(problem.config, problem.free)
-    if not names:
+    if not (at := _start(problem)):
         return minima
-    at = [list(problem.free).index(name) for name in names]
     toward = np.full(2, 0.5)
-    toward[0] += problem.config.parameters[names[0]].numbers[0] or 1.0
+    toward[0] += problem.config.parameters[list(problem.free)[at[0]]].numbers[0] or 1.0
     turned: list[Minimum] = []
     for each in minima:
         if (each.place[at] - 0.5) @ (toward - 0.5) < 0:
@@ -165,6 +167,11 @@ def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
         turned.append(each)
         toward = turned[0].place[at]
     return turned
+
+
+def _start(problem: Problem) -> list[int]:
+    """The indices of the free parameters that half a turn changes to their opposites."""
+    return [list(problem.free).index(name) for name in ranges.mirrored(problem.config, problem.free)]
 
 
 def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:

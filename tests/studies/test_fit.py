@@ -339,6 +339,22 @@ def test_a_drag_is_sought_where_the_configuration_names_none(write: Write) -> No
     assert one.edge.item() == 0
 
 
+def test_a_start_is_given_on_the_side_of_the_configuration(
+    write: Write, seen: tuple[np.ndarray, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a turn takes the body to itself; a profile may end at the opposite of the minimum that it began from."""
+
+    def opposite(*args: Any) -> Any:
+        best, limits, rugged = intervals(*args)
+        return best._replace(place=1 - best.place, jacobian=-best.jacobian), 1 - limits[:, ::-1], rugged
+
+    monkeypatch.setattr("sweep.studies.fit.intervals", opposite)
+    times, spins, _ = seen
+    found = sweep.fit(write(SCENE), Film(times, spins), ["x0", "y0"], **TRUTH)
+    assert (found.value > 0).all()
+    assert ((found.lower_95 < found.value) & (found.value < found.upper_95)).all()
+
+
 def test_film_and_fit_are_shown_side_by_side(found: xr.Dataset) -> None:
     both = shown(found.isel(time=slice(60)))
     assert both.trajectory.values.tolist() == ["film", "fit"]
