@@ -52,7 +52,7 @@ def by_lmfit(residuals: Callable[[np.ndarray], np.ndarray], free: int) -> Answer
     parameters = Parameters()
     for i in range(free):
         parameters.add(f"p{i}", 0.5, min=0, max=1)
-    found = minimize(lambda p: residuals(np.array([*p.valuesdict().values()])), parameters, epsfcn=1e-8)
+    found = minimize(lambda p: residuals(np.array([*p.valuesdict().values()])), parameters, epsfcn=1e-8, max_nfev=2000)
     errors = [np.nan if each.stderr is None else each.stderr for each in found.params.values()]
     return np.array([*found.params.valuesdict().values()]), np.array(errors), float(found.chisqr)
 
