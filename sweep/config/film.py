@@ -24,12 +24,12 @@ MOST_ROWS = 20_000
 """Most rows of a film; a longer film is thinned evenly, since more rows add time and hardly any information."""
 
 # Column names of trackers and phones, without the unit in parentheses: Sensor Logger `seconds_elapsed` and `z` (its
-# `time` counts nanoseconds since 1970), Physics Toolbox `wz`, Tracker `ω` and `θ`. The first match counts.
+# `time` counts nanoseconds since 1970), Physics Toolbox `wz`, Tracker `ω`, `θ` and `θr`. The first match counts.
 _NAMES: dict[str, tuple[str, ...]] = {
     "time": ("seconds elapsed", "time", "t"),
     "spin": ("spin", "n", "angular velocity", "omega", "ω"),
     "gyroscope": ("gyroscope z", "gyro z", "omega z", "wz", "ωz", "ω z"),
-    "heading": ("heading", "angle", "theta", "θ"),
+    "heading": ("heading", "angle", "theta", "θ", "θr"),
     "error": ("error", "sigma", "uncertainty"),
 }
 

@@ -118,6 +118,7 @@ def read(file: str, text: str) -> Table:
 
 def _lines(file: str, text: str) -> tuple[str, Lines]:
     """Split the non-empty lines into cells, and find their separator; raise a `ConfigError` if there are none."""
+    text = _without_title(text)
     try:
         separator = _separator(text)
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True, strict=True)
@@ -127,6 +128,15 @@ def _lines(file: str, text: str) -> tuple[str, Lines]:
     if not (found := [(line, row) for line, row in lines if len(row) > 1 or any(row)]):
         raise fault_of("empty; its first line has to name the columns, such as mu,n0", file=file)
     return separator, found
+
+
+def _without_title(text: str) -> str:
+    """`text` with an empty first line if that is one cell above the names of several columns, as Tracker's `mass_A`."""
+    first, _, rest = text.partition("\n")
+    below = rest.partition("\n")[0]
+    marks = [mark for mark in SEPARATORS if mark in below and mark not in first]
+    titled = any(all(number(cell) is None for cell in below.split(mark)) for mark in marks)
+    return "\n" + rest if titled and first.strip() and not {*SEPARATORS} & {*first} else text
 
 
 def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separator: str) -> None:

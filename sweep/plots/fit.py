@@ -34,7 +34,6 @@ def draw(dataset: xr.Dataset) -> Picture:
     time, seen = dataset["time"].values, dataset["seen"].values
     out = dataset["outlier"].values.reshape(-1, len(time))[0] if "outlier" in dataset else np.zeros(len(time), bool)
     above.plot(time, seen, ".", color="0.6", markersize=3, label="film", gid="seen")
-    above.plot(time[out], seen[out], "x", color="C3", markersize=5, gid="outliers")
     laws = [(str(name), dataset.sel(law=name)) for name in dataset["law"].values] if "law" in dataset.dims else []
     for i, (name, one) in enumerate(laws or [("fit", dataset)]):
         fitted, colour = one["fitted"].values, f"C{i}" if laws else "0.4"
@@ -44,7 +43,11 @@ def draw(dataset: xr.Dataset) -> Picture:
     if isinstance(noise := dataset.attrs.get("noise"), Real):
         below.axhspan(-2 * float(noise), 2 * float(noise), color="0.9", zorder=0, gid="noise")
     low, high = np.nanpercentile(seen[~out], [0, 100])
-    above.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low)) if out.any() and high > low else None
+    if out.any() and high > low:
+        above.set_ylim(low - 0.1 * (high - low), high + 0.1 * (high - low))
+    at = np.clip(seen[out], *above.get_ylim())  # an outlier beyond the axis is marked at its end
+    above.plot(time[out], at, "x", color="C3", markersize=5, clip_on=False, gid="outliers",
+               label="outlier" if out.any() else None)  # fmt: skip
     zero_line(above)
     above.set_ylabel(labels.label(dataset, "seen"))
     zero_line(below)

@@ -33,7 +33,10 @@ def shown(source: xr.Dataset | str | Path, reporter: Reporter | None = None) -> 
 
 
 def _beside(found: xr.Dataset, reporter: Reporter | None) -> xr.Dataset:
-    """Return the film and the fit; the fitted trajectory begins earlier by the delay."""
+    """Return the film, as far as it differs from the fit, and the fit, which begins earlier by the delay.
+
+    Outliers are not shown.
+    """
     config, time = configuration(found), found["time"].values
     parameters = found["parameter"].values.tolist() if "law" not in found.dims else []
     delay = found["value"].sel(parameter="film_delay").item() if "film_delay" in parameters else 0.0
@@ -41,12 +44,14 @@ def _beside(found: xr.Dataset, reporter: Reporter | None) -> xr.Dataset:
     fit = trajectory(replace(config, integrator=integrator), reporter=reporter)
     if "heading" not in fit:
         return fit
-    seen = found["seen"].values
+    best = found.isel(law=int(np.argmax(found["weight"].values))) if "law" in found.dims else found
+    kept = ~best["outlier"].values if "outlier" in best else np.ones(len(time), bool)
+    off, late = (best["seen"] - best["fitted"]).values[kept], time[kept] + delay
     of_angles = found["seen"].attrs.get("units") == "radian"
-    turned, spin = (seen, np.gradient(seen, time)) if of_angles else (cumulative_trapezoid(seen, time, initial=0), seen)
-    series = {"heading": turned, "spin": spin, **{name: np.zeros(len(time)) for name in _AT_REST}}
+    turned, spun = (off, np.gradient(off, late)) if of_angles else (cumulative_trapezoid(off, late, initial=0), off)
+    # What a gyroscope shows of a tilted body is not its spin, so that only their differences are those of the film.
     shown = {
-        name: (fit[name].dims, np.interp(fit["time"].values, time + delay, values).reshape(1, -1))
-        for name, values in series.items()
+        name: fit[name] + np.interp(fit["time"], late, values) for name, values in (("heading", turned), ("spin", spun))
     }
+    shown |= {name: xr.zeros_like(fit[name]) for name in _AT_REST}
     return xr.concat([fit.assign(shown), fit], xr.Variable("trajectory", ["film", "fit"]), combine_attrs="override")

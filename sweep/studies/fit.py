@@ -69,8 +69,10 @@ _RUGGED = "the misfit is rugged: minima lie close together, and the intervals be
 
 
 @deferred()
-def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], None]) -> xr.Dataset:
-    """Fit the law of friction that `config` names."""
+def fit(
+    config: Config, film: Film, free: Sequence[str], note: Callable[[str], None], *, compared: bool = False
+) -> xr.Dataset:
+    """Fit the law of friction that `config` names, which may be one of several that are `compared`."""
     if not np.isfinite([film.time, film.value, film.errors]).all():
         raise fault_of("the film holds a value that is not a number; leave out that instant")
     theirs, known = ranges.of_film(film), config.distributions
@@ -94,9 +96,13 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Callable[[str], N
         raise ConfigError([config.fault(("start", "x0"), f"the range of a free parameter is too wide: {off}")])
     with blamed(config.origin):
         problem, minima = _found(Problem(config, film, sought, _countable(film)), note)
-        best, limits, rugged = intervals(problem, minima[0], note)
+        found, limits, rugged = intervals(problem, minima, note)
+        (best,) = _turned(problem, [found])
+        if best is not found:
+            at = _start(problem)
+            limits[..., at] = 1 - limits[:, ::-1][..., at]
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
-    return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began)
+    return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, compared=compared)
 
 
 def with_optional(config: Config, free: Sequence[str]) -> Config:
@@ -145,20 +151,29 @@ def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list
         if settled.free == problem.free and verdict.judged(settled, minima[0]).fits:
             break
     problem, minima = min(found, key=lambda each: each[1][0].misfit)
-    return problem, _different([_turned(problem, each) for each in minima])
+    return problem, _different(_turned(problem, minima))
 
 
-def _turned(problem: Problem, minimum: Minimum) -> Minimum:
-    """Return the minimum with the same sign of the start as the configuration, where half a turn changes the sign."""
-    names = ranges.mirrored(problem.config, problem.free)
-    if not names:
-        return minimum
-    at = [list(problem.free).index(name) for name in names]
-    if (minimum.place[at[0]] - 0.5) * (problem.config.parameters[names[0]].numbers[0] or 1.0) >= 0:
-        return minimum
-    place, jacobian = minimum.place.copy(), minimum.jacobian.copy()
-    place[at], jacobian[:, at] = 1 - place[at], -jacobian[:, at]
-    return minimum._replace(place=place, jacobian=jacobian)
+def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
+    """Turn minima by half a turn where that changes nothing: the best to the configured start, the others to it."""
+    if not (at := _start(problem)):
+        return minima
+    toward = np.full(2, 0.5)
+    toward[0] += problem.config.parameters[list(problem.free)[at[0]]].numbers[0] or 1.0
+    turned: list[Minimum] = []
+    for each in minima:
+        if (each.place[at] - 0.5) @ (toward - 0.5) < 0:
+            place, jacobian = each.place.copy(), each.jacobian.copy()
+            place[at], jacobian[:, at] = 1 - place[at], -jacobian[:, at]
+            each = each._replace(place=place, jacobian=jacobian)
+        turned.append(each)
+        toward = turned[0].place[at]
+    return turned
+
+
+def _start(problem: Problem) -> list[int]:
+    """Return the indices of the free parameters whose sign half a turn changes."""
+    return [list(problem.free).index(name) for name in ranges.mirrored(problem.config, problem.free)]
 
 
 def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:
@@ -214,7 +229,9 @@ def _different(minima: list[Minimum]) -> list[Minimum]:
     return found
 
 
-def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float) -> xr.Dataset:
+def _labelled(
+    problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float, *, compared: bool
+) -> xr.Dataset:
     """Return the dataset of the result, with the film and the fitted curve."""
     best, film, names = minima[0], problem.film, list(problem.free)
     spread, unit = covariance(problem, best), variance(problem, best)
@@ -257,7 +274,8 @@ def _labelled(problem: Problem, minima: list[Minimum], limits: Array, words: lis
         akaike=float(criterion + 2 * len(names)), noise=noise, outliers=int((~problem.kept).sum()),
         fits=int(judged.fits), fits_because=judged.because,
         verdict=verdict.sentences(problem, judged, problem.values(best.place),
-                                  np.array([problem.values(end) for end in limits[-1]]), edge, words),
+                                  np.array([problem.values(end) for end in limits[-1]]), edge, words,
+                                  compared=compared),
         undetermined="; ".join(words), trajectories=problem.trajectories,
     )  # fmt: skip
 

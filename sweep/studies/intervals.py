@@ -1,13 +1,15 @@
 """Finds the intervals of a fit: how far each parameter can go while the others keep the misfit low.
 
 An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
-within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).
+within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).  It also
+holds the values at every other point found with a misfit that low: other minima, and points on other profiles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,14 +40,29 @@ def variance(problem: Problem, best: Minimum) -> float:
     return best.misfit / (problem.rows - len(problem.free))
 
 
-def intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> tuple[Minimum, Array, bool]:
+class _Side(NamedTuple):
+    """The profile of one parameter on one side of the best minimum."""
+
+    ends: list[float]
+    """Where it leaves the intervals of `LEVELS`."""
+    valley: list[tuple[Array, float]]
+    """Places, and how far their misfits exceed the minimum, in units of the variance."""
+    lower: Minimum | None
+    """A minimum that is lower than the best, if one is met."""
+
+
+def intervals(
+    problem: Problem, minima: Sequence[Minimum], note: Callable[[str], None]
+) -> tuple[Minimum, Array, bool]:  # fmt: skip
     """Return the best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
 
-    An end at 0 or 1 is an end of the range. If a profile meets a lower minimum, the computation starts again from
-    there. If that happens more than once, the misfit is rugged, which is reported too.
+    `minima` are those of the search, the lowest first.  An end at 0 or 1 is an end of the range.  If a profile meets a
+    lower minimum, the computation starts again from there.  If that happens more than once, the misfit is rugged, which
+    is reported too.
     """
+    best = minima[0]
     for restart in range(_RESTARTS + 1):
-        limits, lower = _profiles(problem, best, note, stops=restart < _RESTARTS)
+        limits, lower = _profiles(problem, best, minima, note, stops=restart < _RESTARTS)
         if lower is None:
             break
         (best,) = run_concurrently([partial(minimise, place=lower.place)], problem.answers)
@@ -54,41 +71,50 @@ def intervals(problem: Problem, best: Minimum, note: Callable[[str], None]) -> t
 
 
 def _profiles(
-    problem: Problem, best: Minimum, note: Callable[[str], None], *, stops: bool
+    problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Callable[[str], None], *, stops: bool
 ) -> tuple[Array, Minimum | None]:
     """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
+    unit = variance(problem, best)
+    known = [(best.place, 0.0), *((each.place, (each.misfit - best.misfit) / unit) for each in minima)]
     parameters = range(len(problem.free))
-    sides = [partial(_side, problem=problem, best=best, i=i, sign=sign) for sign in (-1, 1) for i in parameters]
-    found = run_concurrently(sides, problem.answers, lambda side: stops and side[1] is not None)
+    sides = [
+        partial(_side, problem=problem, best=best, known=known, i=i, sign=sign) for sign in (-1, 1) for i in parameters
+    ]
+    found = run_concurrently(sides, problem.answers, lambda side: stops and side.lower is not None)
     note(f"intervals: {problem.trajectories} trajectories so far")
-    lower = min((each for _, each in found if each), key=lambda each: each.misfit, default=None)
+    lower = min((side.lower for side in found if side.lower), key=lambda each: each.misfit, default=None)
     if lower and stops:
         return np.empty(0), lower
-    low, high = np.reshape([ends for ends, _ in found], (2, len(problem.free), len(LEVELS))).transpose(0, 2, 1)
-    # In a rugged misfit a narrow search may have come farther; its end then belongs to the wide interval too.
+    low, high = np.reshape([side.ends for side in found], (2, len(problem.free), len(LEVELS))).transpose(0, 2, 1)
+    known += [each for side in found for each in side.valley]
+    places, above = np.stack([place for place, _ in known]), np.array([rise for _, rise in known])
+    for level, allowed in enumerate(LEVELS.values()):
+        within = places[above <= allowed]
+        low[level] = np.minimum(low[level], within.min(axis=0))
+        high[level] = np.maximum(high[level], within.max(axis=0))
     return np.stack([np.minimum.accumulate(low), np.maximum.accumulate(high)], axis=1), None
 
 
-def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple[list[float], Minimum | None]:
-    """Find where one parameter leaves its intervals of `LEVELS` on one side, and a lower minimum if one is met."""
+def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, float]], i: int, sign: int) -> _Side:
+    """Follow parameter `i` out of its intervals on one side, from the `known` places in the valleys of the misfit."""
     spread, unit = covariance(problem, best), variance(problem, best)
     size = np.sqrt(max(spread[i, i], 1e-30))
     along, reach, ends = spread[:, i] / size**2, float(size), list[float]()
-    valley, lower = [best.place], None
+    side = _Side(ends, [], None)
     for allowed in LEVELS.values():
         near, far = (reach, np.inf) if ends else (0.0, np.inf)
         reach *= float(np.sqrt(allowed / LEVELS[68]))
         for _ in range(8):
             end = float(np.clip(best.place[i] + sign * reach, 0, 1))
-            starts = _starts(valley, best.place + along * (end - best.place[i]), i, end)
+            places = [place for place, rise in known + side.valley if rise < 10 * allowed]
+            starts = _starts(places, best.place + along * (end - best.place[i]), i, end)
             start = min(starts, key=lambda each: float(np.sum(ask(each[None]) ** 2)))
             found = minimise(ask, start, i, _ENOUGH / problem.rows)
             above = (found.misfit - best.misfit) / unit
-            if above < 10 * allowed:
-                valley.append(found.place)
+            side.valley.append((found.place, above))
             if above < -0.01 * allowed:
-                lower = found
-            if lower or abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
+                side = side._replace(lower=found)
+            if side.lower or abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
                 break
             reach = abs(end - best.place[i])
             near, far = (reach, far) if above < allowed else (near, reach)
@@ -96,9 +122,10 @@ def _side(ask: Ask, problem: Problem, best: Minimum, i: int, sign: int) -> tuple
             guess = reach * float(np.sqrt(allowed / max(above, 0.05 * allowed)))
             reach = guess if near < guess < far else (near + far) / 2
         ends.append(float(np.clip(best.place[i] + sign * reach, 0, 1)))
-        if lower:
-            return ends + ends[-1:] * (len(LEVELS) - len(ends)), lower
-    return ends, None
+        if side.lower:
+            ends += ends[-1:] * (len(LEVELS) - len(ends))
+            break
+    return side
 
 
 def _starts(valley: list[Array], straight: Array, i: int, end: float) -> list[Array]:

@@ -54,7 +54,7 @@ def fitted(
         theirs = [each for each in free if each in other.tier.parameters or each not in config.table]
         dropped, names = [each for each in free if each not in theirs], list(dict.fromkeys([*theirs, *own]))
         note(f"law {name}: free are {', '.join(names)}" + (f"; it has no {', '.join(dropped)}" if dropped else ""))
-        found[name] = fit(other, film, names, note)
+        found[name] = fit(other, film, names, note, compared=True)
     return _together(found, film)
 
 

@@ -62,6 +62,23 @@ def test_columns_of_phones_and_trackers_are_known(
     assert found.what == ("spin" if "ω" in header else "gyroscope")
 
 
+@pytest.mark.parametrize(("mark", "comma"), [("\t", False), ("\t", True), (";", True), (",", False)])
+@pytest.mark.parametrize("name", ["ω", "θr"])
+def test_a_table_of_tracker_has_what_it_followed_above_the_names(
+    write: Write, name: str, mark: str, comma: bool
+) -> None:
+    """Its numbers have ten digits, with the comma of the language, and the ends of a derivative are empty."""
+    rows = [[f"{value:.9E}" for value in row] for row in zip(TIMES + 3, SPINS, SPINS, strict=True)]
+    rows[0][2] = rows[-1][2] = ""
+    lines = [mark.join(each) for each in (["t", "x", name], *rows)]
+    text = "\n".join(["mass_A", *lines, ""])
+    found = film.read(write(text.replace(".", ",") if comma else text, "tracker.txt"))
+    np.testing.assert_allclose([found.time, found.value], [TIMES[:-2], SPINS[1:-1]], rtol=1e-9, atol=1e-9)
+    assert (found.what, found.left_out) == ("spin" if name == "ω" else "heading", 2)
+    with pytest.raises(ConfigError, match=r"tracker\.txt:2:.* it has t, x, y"):
+        film.read(write(text.replace(name, "y"), "tracker.txt"))
+
+
 def test_columns_may_be_asked_for_by_name(write: Write) -> None:
     path = write(table("clock,time (s),spin (rad/s),turn,z", TIMES * 1e3, TIMES, UP, np.degrees(SPINS), UP), "film.csv")
     found = film.read(path, "clock (ms)", "turn (deg/s)")
