@@ -31,8 +31,8 @@ SECONDS = 10.0
 
 FRAMES_A_SECOND = 20
 
-_BEYOND = 1.3
-"""The end of a clip, in times of the last of the bodies' first reversals."""
+_BEYOND = 2.0
+"""End of a clip, relative to the latest first reversal of its bodies, which so lies in the middle."""
 
 _BUTTONS = {
     "minus": "−", "fast-backward": "⏮", "step-backward": "⏪", "play fa-flip-horizontal": "◀", "pause": "⏸",

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from sweep.axis import Axis
 from sweep.plots import fine, labels, theory
 from sweep.plots.description import along
-from sweep.plots.figure import Picture, framed, say_nothing, set_scale, zero_line
+from sweep.plots.figure import Picture, framed, set_scale, write_words, zero_line
 from sweep.plots.panels import MAX_PANELS, check, indices
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
@@ -54,7 +54,7 @@ def draw(dataset: xr.Dataset) -> Picture:
         zero_line(axes)
         axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
         if not there:
-            say_nothing(axes, _why_none(chosen))
+            write_words(axes, _why_none(chosen))
         axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()
              if any(variable.startswith(name) for variable in shown)}  # fmt: skip

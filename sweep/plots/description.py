@@ -78,7 +78,7 @@ def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     if not set(MARGINS) <= set(dataset.data_vars):
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
-    words = "from here on so many reversals, by the margins of the cells"
+    words = "boundary where this reversal count begins (estimated)"
     curves = {level: list(contours(counts.distance(level), x, y, corners=True)) for level in counts.levels()}
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 

@@ -35,8 +35,8 @@ TEXT = 9.0
 RATIO = 0.78
 """Height of a map relative to its width."""
 
-_WIDE, _HIGH = 15.2, 7.6
-"""Inches of a page that no user has asked for, across and upwards."""
+_WIDE, _SHAPE = 15.2, 2.0
+"""Inches across of a page that no user has asked for, and its width relative to its height."""
 
 _STYLE: dict[Any, Any] = {
     "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
@@ -70,8 +70,11 @@ _HIGHER = (1.25, 1.6, 2.0, 2.5)
 _SPARE = 0.97
 """Share of a size that has to do: each time that a figure is drawn, its layout is a little different."""
 
-_LEAST = 2.1
+_LEAST = 1.2
 """Inches of a map across, at least."""
+
+_COLUMN, _OF_COLUMN = 6.0, 3
+"""Inches across of a page up to which it is a column of text, and panels in a row there, at most."""
 
 _NARROWEST = 0.1
 """Inches of a panel across on a page without room, which is found too small once it is drawn."""
@@ -225,14 +228,15 @@ def constants_in_lines(constants: str, width: float) -> str:
 
 
 def _wrapped(words: str, room: int, whole: str) -> str:
-    """Words in lines of so many letters, which break nowhere within what the pattern `whole` matches."""
+    """Break words into lines of so many letters, but nowhere within what the pattern `whole` matches."""
     space = "\N{NO-BREAK SPACE}"
-    joined = re.sub(whole, lambda found: found[0].replace(" ", space), words)
-    return fill(joined, max(room, 1), break_long_words=False, break_on_hyphens=False).replace(space, " ")
+    joined = re.sub(whole, lambda match: match[0].replace(" ", space), words)
+    lines = [fill(line, max(room, 1), break_long_words=False, break_on_hyphens=False) for line in joined.split("\n")]
+    return "\n".join(lines).replace(space, " ")
 
 
-def say_nothing(axes: Axes, words: str) -> None:
-    """Say in the middle of empty axes why nothing is drawn there."""
+def write_words(axes: Axes, words: str) -> None:
+    """Write words in the middle of axes without curves."""
     axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", wrap=True)
 
 
@@ -251,9 +255,9 @@ def is_asked() -> bool:
     return bool(mpl.rcParams["figure.figsize"] != mpl.rcParamsDefault["figure.figsize"])
 
 
-def fits(maps: int) -> bool:
-    """Tell whether so many maps can stand side by side."""
-    return page() >= maps * _LEAST
+def is_column() -> bool:
+    """Tell whether the page is as narrow as a column of text: there, a figure shows one thing alone."""
+    return page() <= _COLUMN
 
 
 def panel_width(columns: int, widest: float, around: float) -> float:
@@ -273,8 +277,9 @@ Frames = list[tuple[Axes, xr.Dataset]]
 
 def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, Frames]:
     """A figure with axes over `x` for each panel of a dataset, and the part of the dataset to draw there."""
-    rows, columns = arrangement(len(panels), 2)
-    figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + 2.8 * rows)
+    rows, columns = arrangement(len(panels), 1.5 if is_column() else 2)
+    high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell has words alone
+    figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))
     for k, (axes, panel) in enumerate(frames):
@@ -286,16 +291,18 @@ def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, F
     return figure, [(axes, dataset.isel(panel)) for axes, panel in frames]
 
 
-def arrangement(panels: int, maps: int) -> tuple[int, int]:
+def arrangement(panels: int, maps: float) -> tuple[int, int]:
     """Rows of the page, and panels side by side in each, for so many panels of so many maps.
 
-    The page is shaped as a screen; a narrow one is as high.
+    The figure has about the shape of a screen, with few empty places in its last row.
     """
+    most = _OF_COLUMN if is_column() else panels
 
     def misshapen(groups: int) -> float:
-        return abs(log(groups * maps / (-(-panels // groups) * RATIO) / (page() / _HIGH)))
+        rows = -(-panels // groups)
+        return abs(log(groups * maps / (rows * RATIO) / _SHAPE)) + (rows * groups - panels) / panels
 
-    groups = min((n for n in range(1, panels + 1) if n == 1 or fits(n * maps)), key=misshapen)
+    groups = min((n for n in range(1, most + 1) if n == 1 or n * maps * _LEAST <= page()), key=misshapen)
     return -(-panels // groups), groups
 
 

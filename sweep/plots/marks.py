@@ -17,12 +17,12 @@ from sweep.results.dataset import STATUS_WORDS, VARIABLES
 WORDS = {
     "not_run": "not run",
     "failed": "failed",
-    "impossible": "no such body, or none that stands",
+    "impossible": "impossible body, or one that does not stand upright",
     "no_value": "no value",
-    "time_limit": "lower bound: ended at the time limit, may still grow",
-    "inferred": "inferred from the cells around, not simulated",
-    "noise_limited": "limited by round-off: the count is firm, late times are not",
-    "uncertain": "count not certain: as near to another count as its error, or nearer",
+    "time_limit": "lower bound: reached the time limit",
+    "inferred": "inferred from neighbouring cells, not simulated",
+    "noise_limited": "limited by round-off: the count is certain, late times are not",
+    "uncertain": "uncertain count, near a boundary",
 }
 """The kinds of cell, and what they mean.  A cell may be of several kinds, but of one of the first four at most."""
 
@@ -38,9 +38,10 @@ _PER_VARIABLE = {
     ("t_first_reversal_predicted", "no_value"): "none predicted",
     ("ratio", "no_value"): "no reversal, or none predicted",
     ("reversal_times", "no_value"): "no such reversal",
-    ("spin_final", "time_limit"): "not settled: ended at the time limit",
-    ("spin_mean", "time_limit"): "not settled: ended at the time limit",
-    ("t_stop", "time_limit"): "not settled: ended at the time limit",
+    **dict.fromkeys(
+        [("spin_final", "time_limit"), ("spin_mean", "time_limit"), ("t_stop", "time_limit")],
+        "not settled: reached the time limit",
+    ),
 }
 
 

@@ -31,7 +31,7 @@ from sweep.plots import (
     scales,
     trajectories,
 )
-from sweep.plots.figure import Frames, Picture, framed, is_asked, opaque, style
+from sweep.plots.figure import Frames, Picture, framed, is_asked, is_column, opaque, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
@@ -161,7 +161,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
             raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
         require_whole(dataset)
         return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
-    chosen = panels.choose(dataset, variable, **axes)
+    chosen = panels.choose(dataset, variable, **axes, alone=is_column())
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:
         return maps.draw(chosen, **how)

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.figure import Frames, say_nothing, set_scale
+from sweep.plots.figure import Frames, set_scale, write_words
 from sweep.plots.panels import Panels, title
 from sweep.plots.scales import Limits
 from sweep.results.probabilities import interval, sound
@@ -30,7 +30,7 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
         else:
             _curves(axes, chosen, panels.across[0])
         if chosen["probability"].isnull().all():
-            say_nothing(axes, "all samples failed" if "status" in chosen else "no probability is known")
+            write_words(axes, "all samples failed" if "status" in chosen else "no probability is known")
         axes.set_ylim(limits or (0, 1.02))
         axes.grid(alpha=0.3)
     shown = [axes for axes, chosen in frames if chosen["probability"].notnull().any()]

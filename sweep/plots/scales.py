@@ -170,6 +170,11 @@ def _stepped(steps: Array, values: Array, name: str) -> Scale:
     norm = BoundaryNorm(steps - 0.5, number, extend=arrows)
     nearest_zero = (min(first, last - 1, key=abs) for first, last in pairwise(steps.tolist()))
     ticks = {float(count): f"{count}".replace("-", "−") for count in nearest_zero}
-    every = -(-len(ticks) // _MAX_TICKS)
-    start = list(ticks).index(0) % every if 0 in ticks else 0  # of differences, zero is always labelled
-    return Scale(colour_map(name).resampled(number), norm, dict(list(ticks.items())[start::every]), arrows)
+    return Scale(colour_map(name).resampled(number), norm, thinned(ticks, _MAX_TICKS), arrows)
+
+
+def thinned(ticks: dict[float, str], most: int) -> dict[float, str]:
+    """At most so many ticks, evenly chosen, among them zero."""
+    every = -(-len(ticks) // max(most, 1))
+    start = list(ticks).index(0) % every if 0 in ticks else 0
+    return dict(list(ticks.items())[start::every])

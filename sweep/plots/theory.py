@@ -25,7 +25,7 @@ _SOURCES = {
 }
 """Where a critical spin comes from: the full model if the dataset has it, else the formula of Takano (2011)."""
 
-WORDS = {"n_c1": "a tiny rattle grows", "n_c2": "the spin reverses"}
+WORDS = {"n_c1": "rattle grows", "n_c2": "reversal"}
 
 STYLES = {"n_c1": ("dotted", 1.2), "n_c2": ("solid", 1.2), "best": ("dashed", 1.2), "boundary": ("solid", 0.6)}
 """How the lines over a map are dashed, and their widths in points."""
@@ -68,9 +68,8 @@ def levels(one: xr.Dataset) -> list[tuple[str, str, float, str]]:
 
 def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:
     """Word a legend for n_c1 or n_c2, in figures over the spin or over other parameters."""
-    if over_n0:
-        return f"{name} ({source}): {WORDS[name]} where |{spin}| is larger"
-    return f"{spin} = {name} ({source}): {WORDS[name]} where that is smaller"
+    where = f"|{spin}| is larger" if over_n0 else f"{name} < {spin}"
+    return f"{name} ({source}): {WORDS[name]} where {where}"
 
 
 def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
@@ -128,7 +127,7 @@ def best_shape(dataset: xr.Dataset) -> float | None:
 
 
 def _best_words(b: float) -> str:
-    return f"b = {b:.2f}, where the form factor L(f) is largest"
+    return f"b = {b:.2f}: largest form factor L(f)"
 
 
 def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
