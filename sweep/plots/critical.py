@@ -23,7 +23,7 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
     "_linear": ("eigenvalues of the model", {"linestyle": "-"}),
     "_simulated": ("simulation", {"linestyle": "none", "marker": "x", "markersize": 4}),
 }
-"""Where a critical spin comes from, and how that is drawn."""
+"""Sources of a critical spin, by the suffix of its variable: their words and styles."""
 
 
 def draw(dataset: xr.Dataset) -> Picture:
@@ -68,12 +68,12 @@ def draw(dataset: xr.Dataset) -> Picture:
 
 
 def _found(dataset: xr.Dataset, names: Iterable[str]) -> set[str]:
-    """Those of the critical spins that some body has."""
+    """Return the names of critical spins that at least one body has."""
     return {name for name in names if name in dataset and np.isfinite(dataset[name]).any()}
 
 
 def _why_none(dataset: xr.Dataset) -> str:
-    """Why there is no critical spin, with the number of bodies."""
+    """List the reasons why there is no critical spin, with the number of bodies for each."""
     if not (meanings := labels.flag_words(dataset, "critical_reason")):
         return "no critical spin"
     codes, counts = np.unique(dataset["critical_reason"], return_counts=True)

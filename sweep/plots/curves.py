@@ -41,7 +41,7 @@ _BELOW = 0.03
 
 
 def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
-    """The variables over the one long axis, in a panel for each value of the others; returns entries for a legend."""
+    """Draw the variables over one axis, in a panel for each value of the others; returns legend entries."""
     dataset, x = panels.dataset, panels.across[0] if panels.across else ""
     names = panels.names[:1] + [name for name in panels.names[1:] if dataset[name].notnull().any()]
     kinds = legend(dataset, names[0])

@@ -30,7 +30,7 @@ from sweep.plots import labels
 from sweep.plots.panels import Panel, title
 
 TEXT = 9.0
-"""Points of the text beside which the inches here are told: with smaller text all of a figure is smaller."""
+"""Text size in points for which lengths here are given in inches: a figure with smaller text is smaller."""
 
 RATIO = 0.78
 """Height of a map relative to its width."""
@@ -47,7 +47,7 @@ _STYLE: dict[Any, Any] = {
 """Settings of matplotlib, where the user has none of his own."""
 
 _PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
-"""What figures for print have in their place, so that no text is too small."""
+"""Settings for print that replace these, so that no text is too small."""
 
 _LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
 """Inches that a letter, the rest of an entry and a line take in a legend, and lines for which figures have room."""
@@ -62,13 +62,13 @@ _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 """Inches of a letter of the constant parameters, and most letters in a line of them."""
 
 _UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
-"""What stays on one line: in a label, brackets at its end, such as its unit, and a value; a constant with its unit."""
+"""Patterns kept on one line: the unit at the end of a label, a value; a constant with its unit."""
 
 _HIGHER = (1.25, 1.6, 2.0, 2.5)
-"""How many times as high a figure becomes at most whose width alone is asked for."""
+"""Factors by which a figure of given width may become higher."""
 
 _SPARE = 0.97
-"""Share of a size that has to do: each time that a figure is drawn, its layout is a little different."""
+"""Share of a size that must suffice, because the layout differs a little from one drawing to the next."""
 
 _LEAST = 1.2
 """Inches of a map across, at least."""
@@ -77,7 +77,7 @@ _COLUMN, _OF_COLUMN = 6.0, 3
 """Inches across of a page up to which it is a column of text, and panels in a row there, at most."""
 
 _NARROWEST = 0.1
-"""Inches of a panel across on a page without room, which is found too small once it is drawn."""
+"""Inches across of a panel on a page without room, which is refused once it is drawn."""
 
 
 def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
@@ -90,7 +90,7 @@ def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
     """
     ours = _STYLE | (_PRINT if printed else {})
     found = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
-    # Panels tell the height, and this one keeps the size from being taken for matplotlib's default.
+    # The panels set the height; this one only keeps the size from being taken for matplotlib's default.
     return found | ({"figure.figsize": [width, width / 2]} if width else {})
 
 
@@ -144,7 +144,7 @@ class Picture(Figure):
         return [axes for axes in self.axes if not axes.get_label()]
 
     def explain(self, handles: Sequence[Artist]) -> None:
-        """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
+        """Add a legend below the panels, in as many columns as fit, headed by the constants."""
         self._wrap_labels()
         if not handles and not self._constants:
             return
@@ -176,7 +176,7 @@ class Picture(Figure):
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
     def has_room(self, *, taller: bool) -> bool:
-        """Tell whether the panels have room, perhaps after the figure has become higher."""
+        """Return whether the panels have room, if need be after making the figure taller."""
         wide, high = self.get_size_inches()
         if self._holds(wide, high):
             return True
@@ -186,7 +186,7 @@ class Picture(Figure):
         return any(self._holds(wide, factor * high) for factor in _HIGHER)
 
     def _holds(self, wide: float, high: float) -> bool:
-        """Give the figure this size in inches, and tell whether its panels have room."""
+        """Resize the figure, in inches, and return whether its panels have room."""
         with catch_warnings():
             simplefilter("error")
             try:
@@ -241,7 +241,7 @@ def write_words(axes: Axes, words: str) -> None:
 
 
 def zero_line(axes: Axes) -> None:
-    """Draw where the spin, or what else goes up, is zero."""
+    """Draw a line at zero."""
     axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
 
 
@@ -251,21 +251,22 @@ def page() -> float:
 
 
 def is_asked() -> bool:
-    """Tell whether the user has asked for a size."""
+    """Return whether the user has set a size."""
     return bool(mpl.rcParams["figure.figsize"] != mpl.rcParamsDefault["figure.figsize"])
 
 
 def is_column() -> bool:
-    """Tell whether the page is as narrow as a column of text: there, a figure shows one thing alone."""
+    """Return whether the page is as narrow as a column of text, where a figure shows one thing alone."""
     return page() <= _COLUMN
 
 
 def panel_width(columns: int, widest: float, around: float) -> float:
-    """Inches of each of so many panels side by side: they fill a page that is asked for, and else are not too wide.
+    """Return the width of each of several panels in a row, in inches: a page of given size is filled.
 
     Parameters
     ----------
-    around : inches across of what stands around the panels
+    widest : width of a panel, at most, on a page whose size is not given
+    around : inches across of labels and bars around the panels
     """
     width = max((page() - around) / columns, _NARROWEST)
     return width if is_asked() else min(width, widest)
@@ -276,7 +277,7 @@ Frames = list[tuple[Axes, xr.Dataset]]
 
 
 def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, Frames]:
-    """A figure with axes over `x` for each panel of a dataset, and the part of the dataset to draw there."""
+    """Make a figure with axes over `x` for each panel of a dataset, paired with the part to draw there."""
     rows, columns = arrangement(len(panels), 1.5 if is_column() else 2)
     high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell has words alone
     figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
@@ -292,7 +293,7 @@ def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, F
 
 
 def arrangement(panels: int, maps: float) -> tuple[int, int]:
-    """Rows of the page, and panels side by side in each, for so many panels of so many maps.
+    """Arrange panels of several maps each on a page; returns rows, and panels in a row.
 
     The figure has about the shape of a screen, with few empty places in its last row.
     """

@@ -1,4 +1,4 @@
-"""Says what kind of result each cell of a dataset has, so that figures tell settled counts from all others.
+"""Classify the cells of a dataset by their kind of result, so that figures distinguish certain counts from others.
 
 From the dataset alone, and without any library that draws.
 """
@@ -30,7 +30,7 @@ BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
 
 _GROWING = {"reversals", "raw_reversals", "t_last_reversal", "difference"}
-"""What a longer trajectory can only raise; of the difference, the simulated part."""
+"""Variables that a longer trajectory can only raise (in a difference, the simulated count)."""
 
 _PER_VARIABLE = {
     ("t_last_reversal", "no_value"): "no reversal",
@@ -61,7 +61,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     none = found.isnull() & False
 
     def among(variable: str, *values: int) -> xr.DataArray:
-        """Where a variable with flags has one of these values; nowhere where it has become something else."""
+        """Return where a variable has one of these flags; nowhere if its values are no longer codes."""
         if not simulated or variable not in dataset or not is_code(dataset[variable]):
             return none
         return none | dataset[variable].isin(values)
@@ -97,7 +97,7 @@ def with_results(dataset: xr.Dataset, name: str) -> tuple[Array, int]:
 
 
 def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
-    """Say what a kind of cell means for a variable, in words."""
+    """Return the meaning of a kind of cell for a variable, in words."""
     if kind == "failed":
         codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]

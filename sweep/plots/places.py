@@ -18,7 +18,7 @@ _HALF = np.array([0.045, 0.035])
 """Half the width and height of a word, as a share of the map."""
 
 _LARGE = 0.25
-"""How large the parts of lines are that need a word, as a share of the map."""
+"""Smallest size of a part of a line that needs a word, as a share of the map."""
 
 Word = tuple[float, float, str]
 """x, y and the symbol of a line."""

@@ -1,4 +1,4 @@
-"""How probable each number of reversals is: bars of one scene, or curves over one axis, with their intervals."""
+"""Probabilities of reversal counts: bars for one scene or curves over one axis, with their intervals."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _bars(axes: Axes, chosen: xr.Dataset, *, lowest: bool) -> None:
     share: Array = np.array([more - still for more, still in pairwise(at_least)])
     axes.bar(np.arange(len(share)), share, color="C0", label="share of the samples", zorder=2)
     axes.set_xlim(-0.6, len(share) - 0.4)
-    if "status" in chosen and labels.is_code(chosen["status"]):  # else nobody knows how many samples there are
+    if "status" in chosen and labels.is_code(chosen["status"]):  # otherwise the number of samples is unknown
         low, high = interval(share, np.asarray(sound(chosen).sum()))
         axes.errorbar(
             np.arange(len(share)), share, yerr=[share - low, high - share],

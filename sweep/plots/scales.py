@@ -1,4 +1,4 @@
-"""Colour scales: what colour a value has, and what stands beside the bar.
+"""Colour scales: the colours of values, and the ticks of a colour bar.
 
 All maps get steadily lighter or, about zero, steadily darker on both sides, so that they can be read in grey.
 """
@@ -39,12 +39,12 @@ LARGEST = 10**15
 
 @dataclass(frozen=True)
 class Scale:
-    """How values become colours."""
+    """A mapping from values to colours."""
 
     colours: Colormap
     norm: Normalize
     ticks: dict[float, str] | None = None
-    """What stands beside the bar, and where; chosen by the library that draws if None."""
+    """Labels of the bar, by value; None leaves them to the library that draws."""
     arrows: Arrows = "neither"
     """Ends of the bar beyond which there are values."""
 

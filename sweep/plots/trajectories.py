@@ -109,7 +109,7 @@ def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist
     entries = _series(axes, dataset, {"spin": "spin n"})
     zero_line(axes)
     entries.append(Line2D([], [], linestyle="none", marker="o", color="0.4", markersize=4, label="reversal"))
-    # Of samples, each may be another body.
+    # Each sample may be a different body.
     return entries + (_critical_spins(axes, dataset) if critical and SAMPLE not in dataset.coords else [])
 
 
