@@ -35,7 +35,7 @@ def _links(app: Sphinx, here: str) -> Iterator[nodes.Node]:
             copy.attributes.update(alt=title, classes=[])
             address = app.builder.get_relative_uri(here, docname)
             linked = nodes.reference("", "", copy, internal=True, refuri=address)
-            yield nodes.figure("", linked, nodes.caption("", title))
+            yield nodes.container("", linked, nodes.paragraph("", title))
 
 
 def _is_drawn(image: nodes.Node) -> bool:

@@ -178,6 +178,8 @@ class Picture(Figure):
     def has_room(self, *, taller: bool) -> bool:
         """Return whether the panels have room, if need be after making the figure taller."""
         wide, high = self.get_size_inches()
+        if wide > 1.001 * mpl.rcParams["figure.figsize"][0]:  # its panels had to be wider than the page
+            return False
         if self._holds(wide, high):
             return True
         # What has no room in the highest figure has none in a lower one.

@@ -146,5 +146,5 @@ def test_a_variable_is_drawn_without_its_dataset() -> None:
     figure = picture.plot(made().reversals)
     assert len([axes for axes in figure.axes if axes.get_label() == ""]) == 1
     assert not [text for text in entries(figure) if "time limit" in text]
-    with pytest.raises(ValueError, match="an array without a name is no variable of a run; give the dataset"):
+    with pytest.raises(ValueError, match="an array without a name is not a variable of a run; pass the dataset"):
         picture.plot(made().reversals - made().reversals_predicted)

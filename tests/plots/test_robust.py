@@ -75,7 +75,7 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
         (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "the axis mu has no values; select at least one"),
         (lambda d: d.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
         (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
-        (lambda d: d[["n_c1_plus"]], "none of the variables is drawn unless it is named; choose n_c1_plus"),
+        (lambda d: d[["n_c1_plus"]], "name the variable to draw; choose n_c1_plus"),
         (lambda d: d[["n_c1_plus"]].drop_vars("n_c1_plus").assign_attrs(sweep_kind="run"), "has no variable to draw"),
     ],
 )
@@ -204,16 +204,16 @@ def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None
 
 @pytest.mark.parametrize("size", [{"figsize": (1, 1)}, {"figsize": (2.5, 1)}, {"width": "50mm"}])
 def test_a_size_without_room_is_refused_with_one_that_has(size: dict[str, Any]) -> None:
-    style: Any = {"font.size": 14, "axes.titlesize": 24}
+    style: Any = {"font.size": 14, "axes.titlesize": 20}
     with mpl.rc_context(style):
         with pytest.raises(
             ConfigError, match=f"^{next(iter(size))}: .* is too small for this figure; give "
         ) as refused:
-            picture.plot(made(n0=[0.02, 0.05, 0.1]), **size)
+            picture.plot(made(), **size)
         given = str(refused.value).split("give ")[1].split(",")[0]
         figsize = tuple(map(float, given.removesuffix(" inches").split(" × "))) if "figsize" in size else None
         fitting = {"figsize": figsize} if figsize else {"width": given}
-        picture.plot(made(n0=[0.02, 0.05, 0.1]), **fitting).draw_without_rendering()  # without a warning
+        picture.plot(made(), **fitting).draw_without_rendering()  # without a warning
 
 
 def test_eps_is_opaque(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
