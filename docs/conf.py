@@ -26,6 +26,7 @@ extensions = [
     "docstrings",
     "rooms",
     "tables",
+    "thumbnails",
 ]
 exclude_patterns = ["_ext", "_static"]
 # A public name stands twice: in `sweep` and in the module that defines it.  References may mean either.

@@ -1,4 +1,4 @@
-"""Lets the visitor choose the cells whose trajectories are drawn, and their parameters."""
+"""Widgets for the cells whose trajectories are drawn, and for their parameters."""
 
 from __future__ import annotations
 
@@ -53,16 +53,16 @@ class CellControls:
                 controls.put(cells[active][name])
             self._quiet = False
 
-    def tell(self, curves: Sequence[Curve | None]) -> None:
-        """How long the trajectories took, and how they ended."""
-        told = []
+    def show_ends(self, curves: Sequence[Curve | None]) -> None:
+        """Show how each trajectory ended, and the time that its run took."""
+        lines = []
         for k, curve in enumerate(curves):
             if curve and curve.whole:
                 status = labels.flag_words(curve.dataset, "status")[int(curve.dataset["status"])]
                 unit = labels.si_unit(curve.dataset, "t_stop")
                 end = f"{status}, followed to t = {labels.number(float(curve.dataset['t_stop']))}{unit}"
-                told.append(f"{k + 1}: {escape(end)}, run in {curve.seconds:.2g} s")
-        self._end.text = "<br>".join(told)
+                lines.append(f"{k + 1}: {escape(end)}, run in {curve.seconds:.2g} s")
+        self._end.text = "<br>".join(lines)
 
     def _row(self, k: int, activate: Callable[[int], None], remove: Callable[[int], None]) -> tuple[Row, Button]:
         border = f".bk-btn {{ border-left: 8px solid {CURVES[k]} !important; text-align: left }}"

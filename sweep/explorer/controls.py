@@ -14,7 +14,7 @@ from sweep.explorer.slices import Source
 from sweep.explorer.state import LIMITS, Choice, State, choices, limit
 
 WIDGETS = ":host { color: #1b2733; color-scheme: light; filter: var(--widgets) }"
-"""Of the outermost widgets, which a dark page inverts."""
+"""Style of the outermost widgets, which a dark page inverts."""
 
 BARE = ":host { margin: 0 } .bk-input-group label { font-size: 12px; color: #5b6875 }"
 
@@ -25,7 +25,7 @@ def on(model: Any, name: str, call: Callable[[Any], None]) -> None:
 
 
 class MapControls:
-    """The widgets of all choices: which variable is shown, over which axes, and where on the others."""
+    """Widgets to choose the variable, the axes of the map, and the values of other axes."""
 
     def __init__(self, source: Source, change: Callable[[Callable[[State], State]], None]) -> None:
         """`change` is called with what the visitor makes of the state."""
@@ -39,7 +39,7 @@ class MapControls:
                         styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:
-        """Let the widgets say what is shown."""
+        """Set the widgets to what is shown."""
         along = self._source.dims_of(state.show) | set(self._source.dims)
         for name, choice in self._choices.items():
             k = choice.of(state)
@@ -67,8 +67,8 @@ class MapControls:
             self._change(lambda state: choice.put(state, int(k)))
 
     def _limit(self, name: str, words: str) -> TextInput:
-        """The field of an end of the colour scale; what is not one leaves it to the values."""
-        field = TextInput(title=words, placeholder="least" if name == "low" else "most", width=80, name=name,
+        """Make the field of an end of the colour scale; without a number, the values set that end."""
+        field = TextInput(title=words, placeholder="auto", width=80, name=name,
                           stylesheets=[BARE])  # fmt: skip
 
         def put(state: State, at: float) -> State:

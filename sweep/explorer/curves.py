@@ -1,4 +1,4 @@
-"""Trajectories as Bokeh figures: spin and energies over time, and the body of one of them, which can be played."""
+"""Bokeh figures of trajectories: spin and energies over time, and an animated body."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sweep.grid import Array
 from sweep.plots import labels, theory
 
 _STRETCHES = 3000
-"""Of a longer curve the lowest and the highest sample of each of so many stretches are drawn, of each series."""
+"""Stretches of a long curve; only the lowest and the highest sample of each stretch are drawn."""
 
 _OVER_TIME = ("spin", "energy", "dissipated")
 
@@ -28,7 +28,7 @@ _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "backgrou
 
 
 class Curves:
-    """The figures of the trajectories, with a place for each of `MAX_CELLS` curves."""
+    """The figures of the trajectories, with `MAX_CELLS` curves each."""
 
     def __init__(self) -> None:
         self.spin, self.energy = _figure(260, "spin"), _figure(190, "energies")
@@ -48,7 +48,7 @@ class Curves:
         self.player = Player([self.spin, self.energy])
 
     def show(self, curves: Sequence[Curve | None], names: Sequence[str], active: int) -> None:
-        """Draw the curves, one a place, with their names in the legend; the critical spins are those of `active`."""
+        """Draw the curves with their names in the legend, and the critical spins of the curve `active`."""
         for k, slot in enumerate(self._slots):
             slot.show(curves[k] if k < len(curves) else None, names[k] if k < len(curves) else "")
         present = [curve.dataset for curve in curves if curve]
@@ -117,7 +117,7 @@ class _Slot:
 
 
 def _drawn_samples(series: Sequence[Array]) -> Array:
-    """The samples to draw: of each stretch the lowest and the highest of each series, so that no peak is lost."""
+    """Return the samples to draw: the lowest and highest of each stretch of each series, so that no peak is lost."""
     count = len(series[0])
     stretch = -(-count // _STRETCHES)
     if stretch < 3:

@@ -1,4 +1,4 @@
-"""Makes files of what is seen: the curves as a table, and the configuration of the slice and of its trajectories."""
+"""Export what is shown: the curves as a table, and the configuration of the slice and of its trajectories."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sweep.plots import labels
 
 
 def stem(source: Source) -> str:
-    """The name of all files without its ending: what a configuration may be called, whatever the dataset's title is."""
+    """Return the name of exported files without suffix: the title of the dataset, as far as it is a valid name."""
     words = re.sub(r"[^A-Za-z0-9_-]", "", str(source.dataset.attrs.get("title", "")).split(":")[0])
     return f"{words or 'sweep'}_explored"
 

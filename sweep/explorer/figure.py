@@ -2,7 +2,7 @@
 
 Under it stand cuts along the row and the column of the cell under the pointer, which the browser draws too.
 
-There is no glyph per cell: an image and a table of bits are sent as binary arrays, so that a million cells stay fluid.
+An image and a table of bits are sent as binary arrays, without a glyph per cell, so that a million cells stay fluid.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from sweep.plots.description import Map
 from sweep.plots.scales import Scale
 
 HEIGHT = 480
-"""Of the map, in pixels."""
+"""Height of the map in pixels."""
 
 _CUT_HEIGHT = 150
-"""Of a cut, in pixels."""
+"""Height of a cut in pixels."""
 
 LINES = {name: (dash, round(1.25 * width, 2)) for name, (dash, width) in theory.STYLES.items()}
-"""How the lines over a map are dashed, and their widths in pixels."""
+"""Dashes of the lines over a map, and their widths in pixels."""
 
 _BAR = {
     "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": SOFT,
@@ -55,7 +55,10 @@ class MapFigure:
         # Two images, because an image goes on with the mapper that it was made with.
         self._images = [
             plot.image(image="image", source=self._cells, color_mapper=mapper, **place)
-            for mapper in (models.LinearColorMapper(palette=["black"]), models.LogColorMapper(palette=["black"]))
+            for mapper in (
+                models.LinearColorMapper(palette=["black"], low=0, high=1),
+                models.LogColorMapper(palette=["black"], low=1, high=10),
+            )
         ]
         over = {"image": [np.zeros((2, 2), "uint32")]} | {name: [at] for name, at in place.items()}
         overlay = ColumnDataSource(over, syncable=False)
@@ -63,7 +66,7 @@ class MapFigure:
         self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
         self._numbers = _counts(plot)
         self._uncertain = plot.scatter([], [], color="white", line_color="black", line_width=0.7)
-        # Here the browser writes which cell is under the pointer, and which one is to be run.
+        # The browser writes the cell under the pointer to the first, and the cell to run to the second.
         self.probe = ColumnDataSource({"i": [-1], "j": [-1]}, name="probe")
         self.request = ColumnDataSource({"i": [-1], "j": [-1], "add": [False], "count": [0]}, name="request")
         cursor, self.pins = _cursor(plot), _pins(plot)
@@ -129,7 +132,7 @@ class MapFigure:
 
 
 def _line(plot: Any, dash: str, width: float) -> ColumnDataSource:
-    """A line that is seen on every colour."""
+    """Add a line that is visible on every colour."""
     source = ColumnDataSource({"xs": [], "ys": []})
     plot.multi_line("xs", "ys", source=source, color="white", width=2.5 * width)
     plot.multi_line("xs", "ys", source=source, color="black", width=width, dash=dash)
@@ -187,7 +190,7 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
 
 
 def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
-    """The figure of a cut along an axis, and what `cut` of page.js has to know to fill it."""
+    """Make the figure of a cut along an axis, with the data that `cut` of page.js needs to fill it."""
     plot = figure(
         height=_CUT_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
         x_axis_type=style.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",

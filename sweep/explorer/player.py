@@ -18,7 +18,7 @@ from sweep.explorer.style import GRID, SOFT
 from sweep.plots import body, labels
 
 _MOMENTS = 20_000
-"""Sent to the browser, at most."""
+"""Samples sent to the browser, at most."""
 
 
 class Player:
@@ -95,5 +95,5 @@ class Player:
 
 @cache
 def _camera() -> Any:
-    """Axes that know the perspective of `sweep animate`; to make them takes 30 ms."""
+    """Return axes with the perspective of `sweep animate`; making them takes 30 ms."""
     return Figure().add_axes((0, 0, 1, 1), projection="3d")

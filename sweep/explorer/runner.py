@@ -1,4 +1,4 @@
-"""Runs the trajectories of the cells that are drawn in a thread of their own, while the page stays responsive."""
+"""Run the trajectories of the drawn cells in a separate thread, while the page stays responsive."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ MAX_STEPS = 1e8
 """A trajectory that takes more steps ends with these: an address may name any friction, and so any length of steps."""
 
 MAX_SAMPLES = 200_000
-"""A trajectory that has more is sampled more coarsely; so many, of t = 30 000 of the paper's body, take 27 MB."""
+"""Samples of a trajectory, at most: longer ones are sampled more coarsely."""
 
 COMPILING = "compiling the simulation for this machine; later runs find it in the cache"
 
 _STRETCHES = tuple(0.25**k for k in range(4, -1, -1))
 """A trajectory is run to these shares of its time in turn, so that the first of its curve is seen at once."""
 
-_TELL_EVERY = 0.1
+_REPORT_EVERY = 0.1
 """Seconds between two reports of progress."""
 
 
@@ -49,7 +49,7 @@ class Curve:
     """A trajectory that was run."""
 
     dataset: xr.Dataset
-    """As `sweep.trajectory` gives it, without the dimension `trajectory`."""
+    """The result of `sweep.trajectory`, without the dimension `trajectory`."""
     reversals: Array
     """Times of the reversals, in the unit of the dataset."""
     seconds: float
@@ -59,52 +59,52 @@ class Curve:
 
 
 class Dropped(Exception):
-    """Nobody waits for this trajectory any more."""
+    """Raised to end a run for which nobody waits."""
 
 
 @dataclass(eq=False)
 class Job(Reporter):
-    """A trajectory that somebody waits for; `tell` is called with it, on the runner's thread, at all news of it."""
+    """A trajectory that a page waits for; `report` is called with the job, on the runner's thread, when it changes."""
 
     cell: Cell
-    tell: Callable[[Job], None]
+    report: Callable[[Job], None]
     share: float = 0.0
-    """The part of the time that has been run."""
+    """Share of the time that has been simulated."""
     delay: str = ""
-    """The reason if it does not get on."""
+    """Why the job waits; empty if it runs."""
     curve: Curve | None = None
-    """As far as it has been run; at first that of the job whose place this one takes."""
+    """The curve so far; at first the curve of the job that this one replaces."""
     fault: str = ""
-    """The reason if there will be no curve."""
+    """Why there will be no curve; empty if there will be one."""
     over: bool = False
-    """True if there is nothing more to come."""
+    """Whether the job has ended."""
     dropped: bool = False
-    """Set by whoever stops waiting: the run is not begun, or ends at its next chunk; `tell` is not called again."""
+    """Set when nobody waits any more: the run ends at its next chunk, and `report` is not called again."""
     t_end: float = 1.0
     """The time at which the run ends."""
     rest: Iterator[Curve] = field(default_factory=lambda: iter(()))
     """Runs it further."""
-    _told: float = 0.0
+    _reported: float = 0.0
 
     def news(self, delay: str = "") -> None:
         """Report that something has changed, unless nobody waits."""
-        self.delay, self._told = delay, time.perf_counter()
+        self.delay, self._reported = delay, time.perf_counter()
         if not self.dropped:
-            self.tell(self)
+            self.report(self)
 
     def chunk(self, progress: Progress) -> None:
         """Report how far the run is; end it by `Dropped` if nobody waits."""
         if self.dropped:
             raise Dropped
         self.share = max(self.share, progress.done / self.t_end)
-        if time.perf_counter() - self._told > _TELL_EVERY:
+        if time.perf_counter() - self._reported > _REPORT_EVERY:
             self.news()
 
 
 def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
     """Run the trajectory of a cell, with the usual measurements, to later and later times: one curve after another.
 
-    The last one goes to `t_end`, or to where the trajectory has settled and nothing is worth a look (`lively_until`).
+    The last one goes to `t_end`, or, once the trajectory has settled, a while after its last event (`lively_until`).
     """
     parameters = {name: Values.one(value) for name, value in cell.items()}
     usual, seconds = measures.default(setup.config.equations), 0.0
@@ -129,7 +129,7 @@ def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
 
 
 class Runner:
-    """Runs the trajectories that are asked for, the first stretch of each before the later ones of the others."""
+    """Runs requested trajectories, the first stretch of each before the later stretches of the others."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -141,7 +141,7 @@ class Runner:
         threading.Thread(target=self._work, daemon=True, name="trajectories").start()
 
     def submit(self, job: Job) -> None:
-        """Run a trajectory as soon as those asked for before are as far."""
+        """Run a trajectory, after those submitted earlier have advanced as far."""
         job.rest = run(self._setup, job.cell, job)
         self._jobs.put((0.0, next(self._numbers), job))
         if self._compiles:
@@ -187,9 +187,9 @@ class Runner:
 class Drawn:
     """At most `MAX_CELLS` cells in the order in which they were chosen, one of which is active."""
 
-    def __init__(self, cells: Iterable[Cell], runner: Runner | None, tell: Callable[[Job], None]) -> None:
-        """`tell` is called with each job that has news, on the thread of the runner."""
-        self._runner, self._tell = runner, tell
+    def __init__(self, cells: Iterable[Cell], runner: Runner | None, report: Callable[[Job], None]) -> None:
+        """`report` is called with each job that changes, on the thread of the runner."""
+        self._runner, self._report = runner, report
         self._jobs: list[Job] = []
         self.active = 0
         for cell in cells:
@@ -201,7 +201,7 @@ class Drawn:
 
     @property
     def curves(self) -> list[Curve | None]:
-        """As far as they have been run."""
+        """The curves so far."""
         return [job.curve for job in self._jobs]
 
     def add(self, cell: Cell, *, keep: bool) -> None:
@@ -232,5 +232,5 @@ class Drawn:
 
     def _begun(self, cell: Cell, curve: Curve | None = None) -> Job:
         assert self._runner
-        self._runner.submit(job := Job(cell, self._tell, curve=curve))
+        self._runner.submit(job := Job(cell, self._report, curve=curve))
         return job

@@ -1,4 +1,4 @@
-"""Serves the explorer to browsers on this machine, and to no one else."""
+"""Serve the explorer to browsers on this machine only."""
 
 from __future__ import annotations
 

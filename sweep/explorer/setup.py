@@ -1,4 +1,4 @@
-"""The trajectories of a dataset are run by its configuration, and by a user's model if that is named."""
+"""Set up the trajectories of a dataset from its configuration, with a user-defined model if it is named."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class Setup:
 
 
 def why_still(source: Source) -> str:
-    """Say why no trajectory is run of a file that is not `usable`."""
+    """Explain why trajectories of a file that is not `usable` cannot be run."""
     if place := source.dataset.attrs.get("model_place"):
-        return f"Its model is code of a user, {place}, and runs only if you name it: sweep explore FILE --model MODEL."
+        return f"Its model is user code, {place}; name it to run trajectories: sweep explore FILE --model MODEL."
     return "This file has no configuration to run trajectories from."
 
 

@@ -1,4 +1,4 @@
-"""A dataset as the explorer needs it: its axes, its variables, maps of them, and the values of a cell in words."""
+"""The axes and variables of a dataset, maps of them, and the values of a cell in words, for the explorer."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class PlacedAxis(Axis):
 
     @cached_property
     def drawn_edges(self) -> Array:
-        """Where the cells begin and end on the drawn axis, shape (values + 1,)."""
+        """Edges of the cells on the drawn axis, shape (values + 1,)."""
         return np.arange(len(self.values) + 1) - 0.5 if self.spacing == "uneven" else self.edges
 
     def place(self, values: Any) -> Any:
-        """Where any values of the axis lie on the drawn one; NaN beyond the cells of uneven values."""
+        """Return the places of values on the drawn axis; NaN beyond the cells of uneven values."""
         if self.spacing != "uneven":
             return values
         (low, high), (first, last) = self.edges[[0, -1]], self.drawn_edges[[0, -1]]
@@ -76,7 +76,7 @@ class Source:
 
     @cached_property
     def variables(self) -> list[str]:
-        """Whatever has a number per cell: the counts and what is derived first."""
+        """Names of the variables with a number per cell, counts and derived quantities first."""
         found = [str(n) for n, v in self.cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
         found = [n for n in found if self.cell[n].dtype.kind in "fiub"]
         first = ("reversals", "reversals_predicted", *quantities.DERIVED, "status", "t_stop", "t_last_reversal")
@@ -92,7 +92,7 @@ class Source:
         return set(map(str, self.cell[name].dims))
 
     def words(self, name: str) -> str:
-        """Say what a variable or an axis is."""
+        """Return the words for a variable or an axis."""
         return labels.words(self.cell, name)
 
     @cached_property
@@ -101,7 +101,7 @@ class Source:
         return {self.words(name): str(self.cell[name].attrs.get("description", "")) for name in self.variables}
 
     def label(self, name: str) -> str:
-        """What it is, with the unit."""
+        """Return the words with the unit."""
         return labels.label(self.cell, name) if name in self.cell.variables else self.words(name)
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:
@@ -114,14 +114,14 @@ class Source:
         there = {name: self.dataset.coords[name] for name in names if name in self.dataset.coords}
         return {name: float(known.isel({d: index.get(str(d), 0) for d in known.dims})) for name, known in there.items()}
 
-    def describe(self, index: Mapping[str, int]) -> dict[str, str]:
+    def values_at(self, index: Mapping[str, int]) -> dict[str, str]:
         """All values of the cell at `index`: each variable in words, and its value with its unit."""
         cell = quantities.with_derived(self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load())
-        told = {self.words(n): self._value(cell, n) for n in self.variables}
+        values = {self.words(n): self._value(cell, n) for n in self.variables}
         kinds = marks.marks(cell, self.variables[0])
-        if said := [marks.WORDS[kind] for kind, where in kinds.items() if bool(np.any(where)) and kind != "no_value"]:
-            told["note"] = "; ".join(said)
-        return told
+        if notes := [marks.WORDS[kind] for kind, where in kinds.items() if bool(np.any(where)) and kind != "no_value"]:
+            values["note"] = "; ".join(notes)
+        return values
 
     def _value(self, cell: xr.Dataset, name: str) -> str:
         values = np.ravel(cell[name].values)

@@ -22,7 +22,7 @@ from sweep.plots.scales import LARGEST
 MAX_CELLS = 6
 """Curves over each other; as many as there are colours that everybody can distinguish."""
 
-LIMITS = {"low": "from", "high": "to"}
+LIMITS = {"low": "colours from", "high": "to"}
 """The ends of the colour scale, and what the page calls them."""
 
 # Limits below this are zero: of smaller numbers a logarithmic scale overflows.
@@ -38,7 +38,7 @@ _ENDED = ("beside", "spacing")
 """Keys of links of older versions, which are left out."""
 
 PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coolwarm")
-"""Names of matplotlib's that can be chosen; without one a variable has its own."""
+"""Colour maps of matplotlib to choose from; without one a variable has its default."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class State:
     cells: tuple[Cell, ...] = ()
     palette: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
-    """Those of the `LIMITS` that the visitor has chosen; the rest is as in pictures."""
+    """Ends of the colour scale that the visitor has chosen; the values set the others."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def choices(source: Source) -> dict[str, Choice]:
         unit = labels.si_unit(source.dataset, name)
         exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
         found.append(Choice(name, source.words(name), exact, short, axis))
-    found.append(Choice("palette", "palette", PALETTES, ["its own", *PALETTES[1:]]))
+    found.append(Choice("palette", "palette", PALETTES, ["default", *PALETTES[1:]]))
     return {choice.name: choice for choice in found}
 
 
@@ -125,8 +125,8 @@ def first(source: Source) -> State:
 
 def write(state: State, source: Source, base: Cell) -> str:
     """The query of the address that opens `state`; of a cell it names what lies on an axis or differs from `base`."""
-    told = {name: c.options[c.of(state)] for name, c in choices(source).items() if name not in (state.x, state.y)}
-    pairs = [(name, option) for name, option in told.items() if option]
+    chosen = {name: c.options[c.of(state)] for name, c in choices(source).items() if name not in (state.x, state.y)}
+    pairs = [(name, option) for name, option in chosen.items() if option]
     pairs += [(name, f"{state.limits[name]:.12g}") for name in LIMITS if name in state.limits]
     for cell in state.cells:
         named = {n: v for n, v in cell.items() if n in source.dims or v != base.get(n)}
@@ -179,7 +179,7 @@ def read(
 
 
 def wrong_value(parameter: Parameter, value: float) -> str:
-    """Say what is wrong with the value of a parameter; "" if nothing is."""
+    """Return what is wrong with the value of a parameter, or an empty string."""
     if math.isfinite(value) and parameter.allows(value):
         return ""
     return f"{parameter.name} has to be {parameter.allowed}"
@@ -193,7 +193,7 @@ def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell:
     for pair in text.split(",", len(base)):
         name, _, value = pair.partition(":")
         if name not in cell:
-            raise ValueError(f"{brief(name)} is no parameter; there are {', '.join(cell)}")
+            raise ValueError(f"{brief(name)} is not a parameter; choose {', '.join(cell)}")
         cell[name] = number(value)
         if fault := wrong_value(known[name], cell[name]):
             raise ValueError(fault)

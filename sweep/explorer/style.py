@@ -1,6 +1,6 @@
-"""How figures of the explorer look: their axes, the colours of maps and curves, and patterns over cells.
+"""The style of the explorer's figures: axes, colours of maps and curves, and patterns over cells.
 
-Patterns are tiles of pixels, which the browser lays over the cells that are no plain results.
+Patterns are tiles of pixels, which the browser draws over cells without a plain result.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ GRID = f"{SOFT}40"
 """The colour of lines across a figure."""
 
 CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
-"""Of Okabe and Ito: safe for the colour-blind."""
+"""Colours of curves, from Okabe and Ito: safe for the colour-blind."""
 
 _TICKS = 12
-"""On an axis whose values are listed one by one, at most."""
+"""Ticks of an axis whose values are listed one by one, at most."""
 
 _AXES = {
     "axis_line_color": SOFT, "major_tick_line_color": SOFT, "minor_tick_line_color": None,
@@ -70,7 +70,7 @@ def numbers() -> CustomJSTickFormatter:
 
 
 def kind(axis: PlacedAxis) -> Any:
-    """What Bokeh calls an axis of such values."""
+    """Return Bokeh's name for the type of an axis."""
     return "log" if axis.spacing == "log" else "linear"
 
 
@@ -106,7 +106,7 @@ def is_logarithmic(scale: Scale) -> bool:
 
 
 def beyond(part: Map, scale: Scale) -> str:
-    """Say in words what lies beyond the scale; empty if nothing does."""
+    """Return a note on values beyond the scale; empty if there are none."""
     ends = {"min": ("down to", np.min), "max": ("up to", np.max)}
     there = (said for end, said in ends.items() if scale.arrows in (end, "both"))
     words = " and ".join(f"{said} {extreme(part.shown):.2g}" for said, extreme in there)

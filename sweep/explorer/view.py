@@ -22,7 +22,7 @@ from sweep.explorer.state import Cell, State
 from sweep.explorer.style import CURVES
 from sweep.plots import labels
 
-_NOTICE = {"background": "#1b2733", "border-radius": "8px 8px 0 0", "color": "white", "padding": "6px 16px"}
+_NOTICE = {"background": "#1b2733", "border-radius": "8px", "color": "white", "padding": "6px 16px"}
 
 
 class View:
@@ -30,7 +30,7 @@ class View:
 
     _shown: figure.MapFigure
     _curves: Sequence[Curve | None] = ()
-    """Those that are drawn."""
+    """The curves on the page."""
 
     def __init__(
         self, document: Document, source: Source, setup: Setup | None, runner: Runner | None,
@@ -41,7 +41,7 @@ class View:
         self._known = setup.config.table if setup else {}
         self.state, self._faults = states.read(query, source, self._base, self._known)
         self._build()
-        self._drawn = Drawn(self.state.cells, runner, self._tell)
+        self._drawn = Drawn(self.state.cells, runner, self._report)
         self._draw_map()
         self._draw_cells()
         page.dress(document, source, self._query())
@@ -108,8 +108,8 @@ class View:
             return
         dataset, axes = self._source.dataset, self._source.axes
         here = [labels.measured(dataset, d, axes[d].values[index[d]]) for d in self._source.dims]
-        told = self._source.describe(index)
-        self._cell.text = str(PARTS.cell(", ".join(here), told.pop("note", ""), told, self._source.meanings))
+        values = self._source.values_at(index)
+        self._cell.text = str(PARTS.cell(", ".join(here), values.pop("note", ""), values, self._source.meanings))
 
     # ---- the cells whose trajectories are drawn
 
@@ -144,14 +144,14 @@ class View:
         self._drawn.remove(k)
         self._draw_cells()
 
-    def _tell(self, job: Job) -> None:
-        """Take news of a run, on the thread of the trajectories."""
+    def _report(self, job: Job) -> None:
+        """Pass on a change of a run, on the thread of the trajectories."""
         try:
-            self._document.add_next_tick_callback(partial(self._hear, job))
+            self._document.add_next_tick_callback(partial(self._update, job))
         except AttributeError:  # Bokeh takes the document of a closed page apart before it says so
             job.dropped = True
 
-    def _hear(self, job: Job) -> None:
+    def _update(self, job: Job) -> None:
         if not job.dropped:
             self._faults = [job.fault] if job.fault else self._faults
             if self._drawn.curves != self._curves:
@@ -187,7 +187,7 @@ class View:
         names = [f"{k}: {name}{_counted(curve)}" for k, (name, curve) in named]
         self._hint.visible = not any(curves)
         self._figures.show(curves, names, self._drawn.active)
-        self._chosen.tell(curves)
+        self._chosen.show_ends(curves)
 
     def _names(self) -> list[str]:
         """Name each cell by what distinguishes it from the others."""
@@ -235,7 +235,7 @@ def _counted(curve: Curve | None) -> str:
 
 
 def _end(job: Job) -> None:
-    """Give a run up as soon as there is something of its curve."""
+    """Drop a job once it has the beginning of its curve."""
     job.dropped = job.curve is not None
 
 

@@ -1,4 +1,4 @@
-"""Moving pictures of trajectories: bodies that turn on a table, their contact points' paths, and their spins."""
+"""Animate trajectories: bodies on a table, the paths of their contact points, and their spins."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
 MOST = 6
-"""Bodies side by side."""
+"""Bodies shown side by side, at most."""
 
 SECONDS = 10.0
-"""The time that a clip takes unless its speed is given."""
+"""Duration of a clip whose speed is not given."""
 
 FRAMES_A_SECOND = 20
 
-_BEYOND = 1.3
-"""The end of a clip, in times of the last of the bodies' first reversals."""
+_BEYOND = 2.0
+"""End of a clip, relative to the latest first reversal of its bodies, which so lies in the middle."""
 
 _BUTTONS = {
     "minus": "−", "fast-backward": "⏮", "step-backward": "⏪", "play fa-flip-horizontal": "◀", "pause": "⏸",
     "play": "▶", "step-forward": "⏩", "fast-forward": "⏭", "plus": "+",
 }  # fmt: skip
-"""What a page shows in place of the icons that matplotlib's would load from the network."""
+"""Replacements for the icons that a page of matplotlib would load from the network."""
 
 _SURFACE = {"rstride": 1, "cstride": 1, "linewidth": 0, "antialiased": False, "zorder": 2, "clip_on": False}
-"""How matplotlib draws the surface of a body: each face, without lines between them."""
+"""Options of `plot_surface`: draw each face, without lines between them."""
 
 FORMATS = ("gif", "mp4", "html")
 
@@ -60,7 +60,7 @@ def animate(
     if not body.drawable(found):
         raise fault_of("its bodies have no attitude, or no a, b and c; animate trajectories of slip or noslip")
     if (bodies := found.sizes["trajectory"]) > MOST:
-        raise fault_of(f"{bodies} bodies are too many to stand side by side; choose at most {MOST}")
+        raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}")
     last = float(found["time"][-1])
     end = min(_until(found) if end is None else end, last)
     if not begin < end:
@@ -75,7 +75,7 @@ def animate(
 
 
 def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
-    """Tell a dataset, or the path of its file, from a configuration."""
+    """Return whether `source` is a dataset or the path of one, and not a configuration."""
     return isinstance(source, xr.Dataset) or (isinstance(source, str | Path) and suffix(Path(source)) == "nc")
 
 
@@ -88,7 +88,7 @@ def check(path: Path) -> None:
 
 
 def _until(dataset: xr.Dataset) -> float:
-    """When a clip ends by default."""
+    """Return the time at which a clip ends by default."""
     times = [trajectories.reversal_times(dataset.isel(trajectory=i)) for i in range(dataset.sizes["trajectory"])]
     return _BEYOND * max((each[0] for each in times if len(each)), default=trajectories.lively_until(dataset))
 
@@ -140,7 +140,7 @@ class _Body:
         self.look = {"facecolors": self.moving.colours(str(curve.get_color())), "lightsource": LightSource(**body.SUN)}
 
     def show(self, frame: int) -> None:
-        """Draw the body in place of what it was at the frame before."""
+        """Draw the body at a frame, in place of the previous one."""
         moving, place = self.moving, np.append(self.moving.path[:, frame], 0.0)
         at = np.einsum("ij,jkl->ikl", moving.turns[frame], moving.points - moving.contacts[frame][:, None, None])
         for surface in list(self.axes.collections):

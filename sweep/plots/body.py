@@ -1,6 +1,6 @@
-"""How a body stands on its table while it turns: its surface, its place, and the view of both.
+"""Describe a body that moves on its table: its surface, its attitude and place, and the view of both.
 
-Animations by matplotlib and the explorer's player both ask here.
+Animations by matplotlib and the explorer's player share this description.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from sweep.models.general.surfaces import ELLIPSOID, SURFACES, offset
 from sweep.models.vectors import Vector
 
 SUN = {"azdeg": 225, "altdeg": 60}
-"""Where the light comes from, in degrees."""
+"""Direction of the light, in degrees."""
 
 _LINES = 9
-"""Of the table, in each direction."""
+"""Lines on the table in each direction."""
 
 
 @dataclass(frozen=True)
 class Moving:
-    """A body at some moments, and the points of its surface."""
+    """The attitudes and places of a body at given times, and the points of its surface."""
 
     points: Array
     """In the body's own axes, from the centre of mass, shape (3, heights, azimuths)."""
@@ -63,18 +63,18 @@ class Moving:
         axes.set_axis_off()
 
     def colours(self, colour: str) -> Array:
-        """Of the faces between the points, shape (heights - 1, azimuths - 1, 3): one half is lighter."""
+        """Colour the faces between the points, one half lighter; shape (heights - 1, azimuths - 1, 3)."""
         halves = np.where(self.points[0, :-1, :-1] + self.points[0, 1:, 1:] > 0, 0.8, 0.3)[..., None]
         return np.asarray(1 - (1 - np.array(to_rgb(colour))) * halves)
 
 
 def drawable(dataset: xr.Dataset) -> bool:
-    """Tell whether trajectories have an attitude and a shape; a user's model may call its dimensions as it likes."""
+    """Return whether trajectories have an attitude and a known shape; user-defined models may lack both."""
     return all(name in dataset for name in ("heading", "a", "b", "c"))
 
 
 def moving(one: xr.Dataset, times: Array) -> Moving:
-    """The body of a trajectory at some times."""
+    """Return the body of a trajectory at the given times."""
     columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "offset") if name in one}
     surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
     constants = SimpleNamespace(

@@ -18,7 +18,7 @@ from sweep.plots.theory import Line
 from sweep.results.margins import OPEN, distinct, smoothed
 
 _OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "markeredgecolor": "0.3"}
-"""How points are drawn at which no boundary was found."""
+"""Style of points at which no boundary was found."""
 
 
 def draw(dataset: xr.Dataset) -> Picture:

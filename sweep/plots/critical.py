@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from sweep.axis import Axis
 from sweep.plots import fine, labels, theory
 from sweep.plots.description import along
-from sweep.plots.figure import Picture, framed, say_nothing, set_scale, zero_line
+from sweep.plots.figure import Picture, framed, set_scale, write_words, zero_line
 from sweep.plots.panels import MAX_PANELS, check, indices
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
@@ -23,7 +23,7 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
     "_linear": ("eigenvalues of the model", {"linestyle": "-"}),
     "_simulated": ("simulation", {"linestyle": "none", "marker": "x", "markersize": 4}),
 }
-"""Where a critical spin comes from, and how that is drawn."""
+"""Sources of a critical spin, by the suffix of its variable: their words and styles."""
 
 
 def draw(dataset: xr.Dataset) -> Picture:
@@ -54,7 +54,7 @@ def draw(dataset: xr.Dataset) -> Picture:
         zero_line(axes)
         axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
         if not there:
-            say_nothing(axes, _why_none(chosen))
+            write_words(axes, _why_none(chosen))
         axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
     names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()
              if any(variable.startswith(name) for variable in shown)}  # fmt: skip
@@ -68,12 +68,12 @@ def draw(dataset: xr.Dataset) -> Picture:
 
 
 def _found(dataset: xr.Dataset, names: Iterable[str]) -> set[str]:
-    """Those of the critical spins that some body has."""
+    """Return the names of critical spins that at least one body has."""
     return {name for name in names if name in dataset and np.isfinite(dataset[name]).any()}
 
 
 def _why_none(dataset: xr.Dataset) -> str:
-    """Why there is no critical spin, with the number of bodies."""
+    """List the reasons why there is no critical spin, with the number of bodies for each."""
     if not (meanings := labels.flag_words(dataset, "critical_reason")):
         return "no critical spin"
     codes, counts = np.unique(dataset["critical_reason"], return_counts=True)

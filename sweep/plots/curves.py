@@ -13,8 +13,8 @@ from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
 from sweep.plots import labels, lines, theory
-from sweep.plots.description import describe
-from sweep.plots.figure import Frames, set_scale
+from sweep.plots.description import Map, describe
+from sweep.plots.figure import Frames, set_scale, write_words
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels
 from sweep.plots.quantities import COMPARISONS
@@ -41,7 +41,7 @@ _BELOW = 0.03
 
 
 def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
-    """The variables over the one long axis, in a panel for each value of the others; returns entries for a legend."""
+    """Draw the variables over one axis, in a panel for each value of the others; returns legend entries."""
     dataset, x = panels.dataset, panels.across[0] if panels.across else ""
     names = panels.names[:1] + [name for name in panels.names[1:] if dataset[name].notnull().any()]
     kinds = legend(dataset, names[0])
@@ -60,6 +60,9 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str, kinds: dict
     described = [describe(chosen, name, x) for name in names]
     first = described[0]
     at = first.x.values
+    if len(at) == 1:
+        _values(axes, chosen, described, kinds)
+        return {}
     set_scale(axes, "x", at)
     size = float(np.clip(72 * axes.bbox.width / axes.figure.dpi / len(at) / _ROOM, 0.4, 1))
     for shown in described:
@@ -82,6 +85,19 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str, kinds: dict
         if x == "b" and "form_factor" in chosen and chosen["form_factor"].dims == ("b",):
             entries["form_factor"] = _form_factor(axes, chosen)
     return entries
+
+
+def _values(axes: Axes, chosen: xr.Dataset, described: list[Map], kinds: dict[str, str]) -> None:
+    """Write the values of a single cell: one point is no chart."""
+    lines = []
+    for shown in described:
+        at = shown.values.item()
+        value = f"{labels.number(at)} {labels.unit(chosen, shown.name)}".strip()
+        if not shown.blank.any():
+            lines.append(f"{labels.words(chosen, shown.name)}: {shown.flags.get(at, value)}")
+    lines += [kinds[kind].rpartition(" (")[0] for kind, where in described[0].marks.items() if where.any()]
+    write_words(axes, "\n".join(lines))
+    axes.set_axis_off()
 
 
 def _points(axes: Axes, at: Array, values: Array, style: dict[str, Any], label: str, size: float) -> Line2D:

@@ -1,6 +1,6 @@
-"""Describes a map, from a dataset alone: its values and their colours, the marks of its cells, lines and words.
+"""Describe a map: its values and their colours, the marks of its cells, lines and words.
 
-Two draw it: `sweep.plots.maps` by matplotlib and `sweep.explorer.figure` by Bokeh.
+`sweep.plots.maps` draws it with matplotlib, `sweep.explorer.figure` with Bokeh.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ class Map:
     name: str
     x: Axis
     y: Axis
-    """Of one value, and without a name, where the dataset has a single axis."""
+    """A nameless axis of one value if the dataset has a single axis."""
     values: Array
     """Shape (y, x)."""
     marks: dict[str, Array]
-    """Where the cells are of each kind of `marks.WORDS`, shape (y, x)."""
+    """Masks of the cells of each kind of `marks.WORDS`, shape (y, x)."""
     legend: dict[str, str]
-    """What a legend says of the kinds that occur."""
+    """Legend entries of the kinds that occur."""
     flags: dict[int, str]
     """The meaning of each value; empty if they are numbers."""
     lines: list[Line]
@@ -74,11 +74,11 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
 
 
 def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
-    """Where counts change between the cells of a map, by their margins: a line for each count, none without margins."""
+    """Find the boundaries between counts from the margins of cells: a line for each count; none without margins."""
     if not set(MARGINS) <= set(dataset.data_vars):
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
-    words = "from here on so many reversals, by the margins of the cells"
+    words = "boundary where this reversal count begins (estimated)"
     curves = {level: list(contours(counts.distance(level), x, y, corners=True)) for level in counts.levels()}
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 
@@ -98,7 +98,7 @@ def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:
 
 
 def common_scale(maps: Sequence[Map], limits: Limits | None = None, cmap: str | None = None) -> Scale:
-    """The scale of a map, or that which several of one kind of values share."""
+    """Return the scale of a map, or the common scale of several maps of one kind of value."""
     first = maps[0]
     values = np.concatenate([each.shown for each in maps])
     if first.flags:

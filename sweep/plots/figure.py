@@ -30,13 +30,13 @@ from sweep.plots import labels
 from sweep.plots.panels import Panel, title
 
 TEXT = 9.0
-"""Points of the text beside which the inches here are told: with smaller text all of a figure is smaller."""
+"""Text size in points for which lengths here are given in inches: a figure with smaller text is smaller."""
 
 RATIO = 0.78
 """Height of a map relative to its width."""
 
-_WIDE, _HIGH = 15.2, 7.6
-"""Inches of a page that no user has asked for, across and upwards."""
+_WIDE, _SHAPE = 15.2, 2.0
+"""Inches across of a page that no user has asked for, and its width relative to its height."""
 
 _STYLE: dict[Any, Any] = {
     "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
@@ -47,7 +47,7 @@ _STYLE: dict[Any, Any] = {
 """Settings of matplotlib, where the user has none of his own."""
 
 _PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
-"""What figures for print have in their place, so that no text is too small."""
+"""Settings for print that replace these, so that no text is too small."""
 
 _LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
 """Inches that a letter, the rest of an entry and a line take in a legend, and lines for which figures have room."""
@@ -62,19 +62,22 @@ _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 """Inches of a letter of the constant parameters, and most letters in a line of them."""
 
 _UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
-"""What stays on one line: in a label, brackets at its end, such as its unit, and a value; a constant with its unit."""
+"""Patterns kept on one line: the unit at the end of a label, a value; a constant with its unit."""
 
 _HIGHER = (1.25, 1.6, 2.0, 2.5)
-"""How many times as high a figure becomes at most whose width alone is asked for."""
+"""Factors by which a figure of given width may become higher."""
 
 _SPARE = 0.97
-"""Share of a size that has to do: each time that a figure is drawn, its layout is a little different."""
+"""Share of a size that must suffice, because the layout differs a little from one drawing to the next."""
 
-_LEAST = 2.1
+_LEAST = 1.2
 """Inches of a map across, at least."""
 
+_COLUMN, _OF_COLUMN = 6.0, 3
+"""Inches across of a page up to which it is a column of text, and panels in a row there, at most."""
+
 _NARROWEST = 0.1
-"""Inches of a panel across on a page without room, which is found too small once it is drawn."""
+"""Inches across of a panel on a page without room, which is refused once it is drawn."""
 
 
 def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
@@ -87,7 +90,7 @@ def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
     """
     ours = _STYLE | (_PRINT if printed else {})
     found = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
-    # Panels tell the height, and this one keeps the size from being taken for matplotlib's default.
+    # The panels set the height; this one only keeps the size from being taken for matplotlib's default.
     return found | ({"figure.figsize": [width, width / 2]} if width else {})
 
 
@@ -141,7 +144,7 @@ class Picture(Figure):
         return [axes for axes in self.axes if not axes.get_label()]
 
     def explain(self, handles: Sequence[Artist]) -> None:
-        """A legend below the figure, never over its data, in as many columns as fit; over it the constants."""
+        """Add a legend below the panels, in as many columns as fit, headed by the constants."""
         self._wrap_labels()
         if not handles and not self._constants:
             return
@@ -173,8 +176,10 @@ class Picture(Figure):
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
     def has_room(self, *, taller: bool) -> bool:
-        """Tell whether the panels have room, perhaps after the figure has become higher."""
+        """Return whether the panels have room, if need be after making the figure taller."""
         wide, high = self.get_size_inches()
+        if wide > 1.001 * mpl.rcParams["figure.figsize"][0]:  # its panels had to be wider than the page
+            return False
         if self._holds(wide, high):
             return True
         # What has no room in the highest figure has none in a lower one.
@@ -183,7 +188,7 @@ class Picture(Figure):
         return any(self._holds(wide, factor * high) for factor in _HIGHER)
 
     def _holds(self, wide: float, high: float) -> bool:
-        """Give the figure this size in inches, and tell whether its panels have room."""
+        """Resize the figure, in inches, and return whether its panels have room."""
         with catch_warnings():
             simplefilter("error")
             try:
@@ -225,19 +230,20 @@ def constants_in_lines(constants: str, width: float) -> str:
 
 
 def _wrapped(words: str, room: int, whole: str) -> str:
-    """Words in lines of so many letters, which break nowhere within what the pattern `whole` matches."""
+    """Break words into lines of so many letters, but nowhere within what the pattern `whole` matches."""
     space = "\N{NO-BREAK SPACE}"
-    joined = re.sub(whole, lambda found: found[0].replace(" ", space), words)
-    return fill(joined, max(room, 1), break_long_words=False, break_on_hyphens=False).replace(space, " ")
+    joined = re.sub(whole, lambda match: match[0].replace(" ", space), words)
+    lines = [fill(line, max(room, 1), break_long_words=False, break_on_hyphens=False) for line in joined.split("\n")]
+    return "\n".join(lines).replace(space, " ")
 
 
-def say_nothing(axes: Axes, words: str) -> None:
-    """Say in the middle of empty axes why nothing is drawn there."""
+def write_words(axes: Axes, words: str) -> None:
+    """Write words in the middle of axes without curves."""
     axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", wrap=True)
 
 
 def zero_line(axes: Axes) -> None:
-    """Draw where the spin, or what else goes up, is zero."""
+    """Draw a line at zero."""
     axes.axhline(0, color=mpl.rcParams["text.color"], linewidth=0.5)
 
 
@@ -247,21 +253,22 @@ def page() -> float:
 
 
 def is_asked() -> bool:
-    """Tell whether the user has asked for a size."""
+    """Return whether the user has set a size."""
     return bool(mpl.rcParams["figure.figsize"] != mpl.rcParamsDefault["figure.figsize"])
 
 
-def fits(maps: int) -> bool:
-    """Tell whether so many maps can stand side by side."""
-    return page() >= maps * _LEAST
+def is_column() -> bool:
+    """Return whether the page is as narrow as a column of text, where a figure shows one thing alone."""
+    return page() <= _COLUMN
 
 
 def panel_width(columns: int, widest: float, around: float) -> float:
-    """Inches of each of so many panels side by side: they fill a page that is asked for, and else are not too wide.
+    """Return the width of each of several panels in a row, in inches: a page of given size is filled.
 
     Parameters
     ----------
-    around : inches across of what stands around the panels
+    widest : width of a panel, at most, on a page whose size is not given
+    around : inches across of labels and bars around the panels
     """
     width = max((page() - around) / columns, _NARROWEST)
     return width if is_asked() else min(width, widest)
@@ -272,9 +279,10 @@ Frames = list[tuple[Axes, xr.Dataset]]
 
 
 def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, Frames]:
-    """A figure with axes over `x` for each panel of a dataset, and the part of the dataset to draw there."""
-    rows, columns = arrangement(len(panels), 2)
-    figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + 2.8 * rows)
+    """Make a figure with axes over `x` for each panel of a dataset, paired with the part to draw there."""
+    rows, columns = arrangement(len(panels), 1.5 if is_column() else 2)
+    high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell has words alone
+    figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))
     for k, (axes, panel) in enumerate(frames):
@@ -286,16 +294,18 @@ def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, F
     return figure, [(axes, dataset.isel(panel)) for axes, panel in frames]
 
 
-def arrangement(panels: int, maps: int) -> tuple[int, int]:
-    """Rows of the page, and panels side by side in each, for so many panels of so many maps.
+def arrangement(panels: int, maps: float) -> tuple[int, int]:
+    """Arrange panels of several maps each on a page; returns rows, and panels in a row.
 
-    The page is shaped as a screen; a narrow one is as high.
+    The figure has about the shape of a screen, with few empty places in its last row.
     """
+    most = _OF_COLUMN if is_column() else panels
 
     def misshapen(groups: int) -> float:
-        return abs(log(groups * maps / (-(-panels // groups) * RATIO) / (page() / _HIGH)))
+        rows = -(-panels // groups)
+        return abs(log(groups * maps / (rows * RATIO) / _SHAPE)) + (rows * groups - panels) / panels
 
-    groups = min((n for n in range(1, panels + 1) if n == 1 or fits(n * maps)), key=misshapen)
+    groups = min((n for n in range(1, most + 1) if n == 1 or n * maps * _LEAST <= page()), key=misshapen)
     return -(-panels // groups), groups
 
 

@@ -27,7 +27,7 @@ def critical_spins(dataset: xr.Dataset, *axes: Axis) -> Mapping[str, xr.DataArra
 
     They go from edge to edge of a map, and from the first to the last value of curves.  Each extends over those of the
     axes on which the body depends.  There are none if a parameter of the body varies along another axis, and none if
-    the dataset tells no configuration, or one whose model is code of a user.
+    the dataset has no configuration, or one whose model is user-defined.
     """
     text = str(dataset.attrs.get("config", ""))
     config = _config(text)

@@ -1,4 +1,4 @@
-"""A film beside the trajectory that fits it, and what is left between them."""
+"""A film, the trajectory that fits it, and their residuals."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _LETTERS = 13
 
 
 def draw(dataset: xr.Dataset) -> Picture:
-    """The film and the fit, or those of several laws, over time; below the residuals, beside the values or weights.
+    """Draw the film and the fit, or the fits of several laws, over time, with the residuals below.
 
-    Under the title stands the verdict, outliers are crossed out, and a band shows the noise of the residuals.
+    The title gives the verdict; outliers are crossed out, and a band shows the noise of the residuals.
     """
     width = panel_width(1, 11, 0)
     lines = [line for each in verdict(dataset) for line in textwrap.wrap(each, int(_LETTERS * width))]

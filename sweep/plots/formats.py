@@ -6,7 +6,7 @@ from pathlib import Path
 
 PICTURES = ("png", "pdf", "svg", "eps")
 A_PICTURE = "png, pdf, svg or eps"
-"""The same in words."""
+"""`PICTURES` in words, for messages."""
 
 
 def suffix(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""How maps draw the kinds of their cells: hatches over results, grounds where there is none, and dots."""
+"""Draw the kinds of cell of a map: hatches over results, plain grounds where there is no result, and dots."""
 
 from __future__ import annotations
 
@@ -26,6 +26,9 @@ HATCHES = {"time_limit": "////", "inferred": "..", "noise_limited": "||||"}
 
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "white", "markeredgecolor": "black"}
 
+_DOT_SIZE = 2.4
+"""Points across of a dot, which may be larger than its cell: smaller ones cannot be seen in print."""
+
 _LIGHT, _DARK = (1.0, 1.0, 1.0, 0.7), (0.0, 0.0, 0.0, 0.55)
 """Hatches on dark and on light cells."""
 
@@ -47,8 +50,7 @@ def draw(axes: Axes, kinds: dict[str, Array], across: tuple[Array, Array], dark:
     if "uncertain" in kinds and kinds["uncertain"].any():
         rows, columns = np.nonzero(kinds["uncertain"])
         y, x = ((edges[1:] + edges[:-1]) / 2 for edges in across)
-        size = float(np.clip(60 / max(dark.shape), 0.8, 2.5))
-        axes.plot(x[columns], y[rows], markersize=size, markeredgewidth=size / 6, gid="uncertain", **_DOT)
+        axes.plot(x[columns], y[rows], markersize=_DOT_SIZE, markeredgewidth=0.5, gid="uncertain", **_DOT)
 
 
 def handle(kind: str, words: str) -> Artist:

@@ -28,13 +28,13 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 
 
 def words(dataset: xr.Dataset, name: str) -> str:
-    """Say what a variable or coordinate is, without its unit."""
-    told = dataset[name].attrs.get("long_name") if name in dataset.variables else None
-    return str(told or short(name))
+    """Return the words for a variable or coordinate, without its unit."""
+    own = dataset[name].attrs.get("long_name") if name in dataset.variables else None
+    return str(own or short(name))
 
 
 def short(name: str) -> str:
-    """The same of a variable of a run, or of one whose attributes are lost."""
+    """Return the standard words for a variable, or its name with spaces."""
     return _RECORDS[name].long_name if name in _RECORDS else name.replace("_", " ")
 
 
@@ -69,7 +69,7 @@ def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
 
 
 def is_code(flags: xr.DataArray) -> bool:
-    """Tell whether the values of a variable with flags still are its codes: a mean of codes is none."""
+    """Return whether the values of a variable with flags are still codes; an averaged status is not."""
     return flags.dtype.kind in "iub"
 
 

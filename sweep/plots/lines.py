@@ -1,4 +1,4 @@
-"""How matplotlib draws the lines of theory, and those on which counts change."""
+"""Draw the lines of theory and the boundaries of counts with matplotlib."""
 
 from __future__ import annotations
 
@@ -27,18 +27,17 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
 
     Parameters
     ----------
-    labelled : whether there is room for words on the lines
+    labelled : whether there is room for words on the lines; without it, boundaries are left out
     """
     box = axes.axis()
-    for line in shown.lines:
+    drawn, words = places.legible(shown.lines, shown.x, shown.y, room=labelled)
+    for line in drawn:
         style = _STYLES[line.name]
         for part in line.parts:
             axes.plot(*part, color="black", path_effects=_halo(2 * style["linewidth"]), gid=line.name, **style)
     axes.axis(box)
-    if labelled:
-        first = sorted((line for line in shown.lines if line.symbol), key=lambda line: line.name != "boundary")
-        write(axes, places.words(first, shown.x, shown.y))
-    return {line.words: entry(line.name, line.words) for line in shown.lines}
+    write(axes, words)
+    return {line.words: entry(line.name, line.words) for line in drawn}
 
 
 def write(axes: Axes, words: Iterable[places.Word]) -> None:

@@ -9,52 +9,57 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Patch
 
+from sweep.parameters import PARAMETERS
 from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
-from sweep.plots.figure import RATIO, Picture, arrangement, fits, panel_width, set_scale
+from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.marks import legend, with_results
 from sweep.plots.panels import Panel, Panels, title
-from sweep.plots.scales import Limits, Scale
+from sweep.plots.scales import Limits, Scale, thinned
 
 _WIDEST = 4.4
 """Inches of a map across, at most."""
 
-_SMALL = 2.5
-"""Inches of a map across below which it is too small for symbols at lines."""
+_SMALL = 2.2
+"""Inches of a map across below which numbers and symbols do not fit on its lines."""
+
+_TICK = 0.2
+"""Inches of a bar for each of its ticks, at least."""
 
 _AROUND = 1.2
 """Inches across of what stands around maps."""
 
 _OF_DIFFERENCES = ("failed", "not_run", "impossible", "no_value", "time_limit")
-"""Kinds of cell marked on maps of differences and ratios too; the map of the simulated counts beside it has all."""
+"""Kinds of cell that maps of differences and ratios mark too; the map of the simulated counts next to them has all."""
 
 
 def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Picture:
-    """A map of each variable over two axes, side by side, and such a row for each value of the other axes."""
+    """Draw a map of each variable over two axes, and one such row for each value of the other axes.
+
+    All maps of a variable and of its prediction share a scale and its bar; the legend explains flags.
+    """
     dataset, names = panels.dataset, panels.names + panels.compared
     maps = _maps(panels, names)
-    together = len(names) if fits(len(names)) else 1
-    # Maps side by side share the bar of their scale, beside the last of them; flags are told in the legend.
-    shared = [[name] for name in names] if together == 1 else [*filter(None, [panels.names, panels.compared])]
     count = len(names) * len(maps)
-    rows, across = arrangement(count // together, together)
-    columns = across * together
+    rows, groups = arrangement(len(maps), len(names))
+    columns = groups * len(names)
     width = panel_width(columns, _WIDEST, _AROUND)
-    figure = Picture(width * columns + _AROUND, 1.6 + width * RATIO * rows)
+    figure = Picture(width * columns + _AROUND, 2.0 + width * RATIO * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     frames = figure.panels(rows, columns, count, sharex=True, sharey=True)
-    scales = [_scales(maps, k, panels.names, limits, cmap) for k in range(len(maps))]
+    scales = _scales(panels, maps, limits, cmap)
     entries: dict[str, Artist] = {}
-    for k, shown in enumerate(maps):
-        axes = dict(zip(names, frames[k * len(names) :], strict=False))
-        for i, (name, one) in enumerate(axes.items(), k * len(names)):
-            compared = name in panels.compared
-            entries |= _map(one, shown[name], scales[k][name], labelled=width >= _SMALL, compared=compared)
-            one.set_title(_title(panels, name, panels.each[k]))
-            _label_axes(one, dataset, shown[name], left=i % together == 0, lowest=i + columns >= count)
-        for group in shared if not shown[names[0]].flags else ():
-            _bar([axes[name] for name in group], dataset, group[-1], scales[k][group[-1]])
-    figure.explain([*_meanings(panels, maps, scales[0][names[0]]), *entries.values()])
+    for i, axes in enumerate(frames):
+        k, name = i // len(names), names[i % len(names)]
+        shown, compared = maps[k][name], name in panels.compared
+        entries |= _map(axes, shown, scales[name], labelled=width >= _SMALL, compared=compared)
+        axes.set_title(_title(panels, name, panels.each[k], topmost=i < columns))
+        _label_axes(axes, dataset, shown, left=i % columns == 0, lowest=i + columns >= count, brief=width < _SMALL)
+    for group in (panels.names, panels.compared):
+        if group and not maps[0][group[0]].flags:
+            of_group = [axes for i, axes in enumerate(frames) if names[i % len(names)] in group]
+            _bar(of_group, dataset, group[-1], scales[group[-1]], int(width * RATIO * rows / _TICK))
+    figure.explain([*_meanings(panels, maps, scales[names[0]]), *entries.values()])
     return figure
 
 
@@ -77,16 +82,16 @@ def _maps(panels: Panels, names: list[str]) -> Maps:
     return [{name: describe(panels.dataset.isel(panel), name, right, down) for name in names} for panel in panels.each]
 
 
-def _scales(maps: Maps, k: int, together: list[str], limits: Limits | None, cmap: str | None) -> dict[str, Scale]:
-    """The scales of a panel: what is simulated and predicted share theirs, and flags theirs with the other panels."""
-    shown = maps[k]
-    panels = maps if shown[together[0]].flags else [shown]
-    common = common_scale([panel[name] for panel in panels for name in together], limits, cmap)
-    return {name: common if name in together else common_scale([each]) for name, each in shown.items()}
+def _scales(panels: Panels, maps: Maps, limits: Limits | None, cmap: str | None) -> dict[str, Scale]:
+    """The scale of each variable, the same in all panels; simulated and predicted values share one."""
+    common = common_scale([each[name] for each in maps for name in panels.names], limits, cmap)
+    return dict.fromkeys(panels.names, common) | {
+        name: common_scale([each[name] for each in maps]) for name in panels.compared
+    }
 
 
 def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool = False) -> dict[str, Artist]:
-    """Draw one map, perhaps of how two others compare; returns the entries that its lines need in the legend."""
+    """Draw one map; returns the legend entries of its lines.  A map of how two others compare has fewer marks."""
     set_scale(axes, "x", shown.x.values)
     set_scale(axes, "y", shown.y.values)
     values = np.ma.masked_where(shown.blank, shown.values)
@@ -101,37 +106,45 @@ def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool
     return dict(lines.draw(axes, shown, labelled=labelled))
 
 
-def _title(panels: Panels, name: str, panel: Panel) -> str:
-    """Name what a map shows."""
+def _title(panels: Panels, name: str, panel: Panel, *, topmost: bool) -> str:
+    """Name what the maps of a column show, unless their bar does, and below it the values of the other axes."""
     words, compared = labels.words(panels.dataset, name), name in panels.compared
-    if panels.compared:  # what they have in common stands at the bar
+    if panels.compared:
         words = words.rpartition(", ")[2] if compared else labels.short(name).partition(", ")[2] or "simulated"
     elif panel and not labels.flag_words(panels.dataset, name):
-        words = ""  # it stands at the bar
-    return ", ".join(filter(None, [words, title(panels.dataset, panel)]))
+        words = ""
+    if panels.compared and not topmost:
+        words = ""
+    return "\n".join(filter(None, [words, title(panels.dataset, panel)]))
 
 
-def _label_axes(axes: Axes, dataset: xr.Dataset, shown: Map, *, left: bool = True, lowest: bool = True) -> None:
-    """Write what the axes of a map show, on the left and below."""
+def _label_axes(
+    axes: Axes, dataset: xr.Dataset, shown: Map, *, left: bool = True, lowest: bool = True, brief: bool = False
+) -> None:
+    """Label the axes of a map on the left and below, in `brief` with their symbols."""
     axes.tick_params(labelleft=left, labelbottom=lowest)
-    if left:
-        axes.set_ylabel(labels.label(dataset, shown.y.name))
-    if lowest:
-        axes.set_xlabel(labels.label(dataset, shown.x.name))
+    x, y = (
+        labels.with_unit(labels.symbol(axis.name), labels.unit(dataset, axis.name))
+        if brief and axis.name in PARAMETERS
+        else labels.label(dataset, axis.name)
+        for axis in (shown.x, shown.y)
+    )
+    axes.set(xlabel=x if lowest else "", ylabel=y if left else "")
 
 
-def _bar(beside: list[Axes], dataset: xr.Dataset, name: str, scale: Scale) -> None:
-    """Draw the bar of a scale beside the maps that share it, with what it shows."""
+def _bar(beside: list[Axes], dataset: xr.Dataset, name: str, scale: Scale, most: int = 12) -> None:
+    """Draw the bar of a scale to the right of the maps that share it, with its label."""
     figure = beside[0].figure
     bar = figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=beside, extend=scale.arrows, pad=0.02)
     bar.set_label(labels.common(dataset, name))
     if scale.ticks:
-        bar.set_ticks(list(scale.ticks), labels=list(scale.ticks.values()))
+        ticks = thinned(scale.ticks, most)
+        bar.set_ticks(list(ticks), labels=list(ticks.values()))
         bar.ax.minorticks_off()
 
 
 def _meanings(panels: Panels, maps: Maps, scale: Scale) -> list[Artist]:
-    """Say what the colours of flags and the marks of cells mean, and how many cells have them."""
+    """Explain the colours of flags and the marks of cells, with the number of cells that have them."""
     handles: list[Artist] = []
     name, whole = panels.names[0], panels.whole
     if maps[0][name].flags:

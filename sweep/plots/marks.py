@@ -1,4 +1,4 @@
-"""Says what kind of result each cell of a dataset has, so that figures tell settled counts from all others.
+"""Classify the cells of a dataset by their kind of result, so that figures distinguish certain counts from others.
 
 From the dataset alone, and without any library that draws.
 """
@@ -17,12 +17,12 @@ from sweep.results.dataset import STATUS_WORDS, VARIABLES
 WORDS = {
     "not_run": "not run",
     "failed": "failed",
-    "impossible": "no such body, or none that stands",
+    "impossible": "impossible body, or one that does not stand upright",
     "no_value": "no value",
-    "time_limit": "lower bound: ended at the time limit, may still grow",
-    "inferred": "inferred from the cells around, not simulated",
-    "noise_limited": "limited by round-off: the count is firm, late times are not",
-    "uncertain": "count not certain: as near to another count as its error, or nearer",
+    "time_limit": "lower bound: reached the time limit",
+    "inferred": "inferred from neighbouring cells, not simulated",
+    "noise_limited": "limited by round-off: the count is certain, late times are not",
+    "uncertain": "uncertain count, near a boundary",
 }
 """The kinds of cell, and what they mean.  A cell may be of several kinds, but of one of the first four at most."""
 
@@ -30,7 +30,7 @@ BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
 
 _GROWING = {"reversals", "raw_reversals", "t_last_reversal", "difference"}
-"""What a longer trajectory can only raise; of the difference, the simulated part."""
+"""Variables that a longer trajectory can only raise (in a difference, the simulated count)."""
 
 _PER_VARIABLE = {
     ("t_last_reversal", "no_value"): "no reversal",
@@ -38,9 +38,10 @@ _PER_VARIABLE = {
     ("t_first_reversal_predicted", "no_value"): "none predicted",
     ("ratio", "no_value"): "no reversal, or none predicted",
     ("reversal_times", "no_value"): "no such reversal",
-    ("spin_final", "time_limit"): "not settled: ended at the time limit",
-    ("spin_mean", "time_limit"): "not settled: ended at the time limit",
-    ("t_stop", "time_limit"): "not settled: ended at the time limit",
+    **dict.fromkeys(
+        [("spin_final", "time_limit"), ("spin_mean", "time_limit"), ("t_stop", "time_limit")],
+        "not settled: reached the time limit",
+    ),
 }
 
 
@@ -60,7 +61,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     none = found.isnull() & False
 
     def among(variable: str, *values: int) -> xr.DataArray:
-        """Where a variable with flags has one of these values; nowhere where it has become something else."""
+        """Return where a variable has one of these flags; nowhere if its values are no longer codes."""
         if not simulated or variable not in dataset or not is_code(dataset[variable]):
             return none
         return none | dataset[variable].isin(values)
@@ -96,7 +97,7 @@ def with_results(dataset: xr.Dataset, name: str) -> tuple[Array, int]:
 
 
 def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
-    """Say what a kind of cell means for a variable, in words."""
+    """Return the meaning of a kind of cell for a variable, in words."""
     if kind == "failed":
         codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]

@@ -1,4 +1,4 @@
-"""Says what a figure of a dataset shows: which variables over which axes, in a panel for each value of the others.
+"""Choose what a figure of a dataset shows: variables, axes, and a panel for each value of other axes.
 
 Free of any library that draws.
 """
@@ -38,16 +38,16 @@ Panel = dict[str, int]
 
 @dataclass(frozen=True)
 class Panels:
-    """What to draw, and where."""
+    """The variables to draw, and their axes and panels."""
 
     dataset: xr.Dataset
-    """Of the cells that are drawn."""
+    """The cells that are drawn."""
     whole: xr.Dataset
-    """Of all cells."""
+    """All cells."""
     names: list[str]
     """The variable, or the two that it compares: what shares a scale."""
     compared: list[str]
-    """How the two compare, for maps alone: `difference` or `ratio`."""
+    """Their comparison, for maps alone: `difference` or `ratio`."""
     across: list[str]
     """Dimensions drawn as axes, the vertical one first: up to two."""
     each: list[Panel]
@@ -152,8 +152,8 @@ def title(dataset: xr.Dataset, panel: Panel) -> str:
 def _variables(dataset: xr.Dataset, variable: str | None, *, alone: bool) -> tuple[list[str], list[str]]:
     """The variables to draw, and how they compare."""
     chosen = variable or (subject if alone else first_picture)(dataset)
-    beside = [] if alone or chosen not in derivable(dataset) else [*COMPARISONS.get(chosen, ())]
-    return (beside, [chosen]) if beside else ([chosen], [])
+    pair = [] if alone or chosen not in derivable(dataset) else [*COMPARISONS.get(chosen, ())]
+    return (pair, [chosen]) if pair else ([chosen], [])
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:

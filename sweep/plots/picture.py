@@ -31,7 +31,7 @@ from sweep.plots import (
     scales,
     trajectories,
 )
-from sweep.plots.figure import Frames, Picture, framed, is_asked, opaque, style
+from sweep.plots.figure import Frames, Picture, framed, is_asked, is_column, opaque, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
@@ -56,7 +56,7 @@ _OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
     FIT: fit.draw,
     INDICES: indices.draw,
 }
-"""How the kinds of dataset are drawn that are not drawn as maps or curves."""
+"""Functions that draw the kinds of dataset other than maps and curves of a run."""
 
 
 def plot(
@@ -79,9 +79,10 @@ def plot(
     Parameters
     ----------
     dataset : a dataset, the path of its file, or one of its variables, whose cells then have no marks
-    variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`.  The maps of `difference` and `ratio` stand
-        beside the maps of the two variables that they compare.  By default the first that the configuration names
-        under `picture`, or else the reversals, by their difference from the prediction if there is one
+    variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`.  Maps of `difference` and `ratio` are shown
+        together with the two variables that they compare, except in a figure as narrow as a column of text.  By default
+        the first that the configuration names under `picture`, or else the reversals, compared with the prediction if
+        there is one
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
     sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
@@ -144,16 +145,16 @@ def plot(
 
 
 def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
-    """A dataset, wherever it is.  A variable of one brings its coordinates along."""
+    """Return the dataset that is given, or read it; a variable brings its coordinates along."""
     if isinstance(source, xr.DataArray):
         if source.name not in {*VARIABLES, *DERIVED}:
-            raise fault_of(f"{source.name or 'an array without a name'} is no variable of a run; give the dataset")
+            raise fault_of(f"{source.name or 'an array without a name'} is not a variable of a run; pass the dataset")
         return source.to_dataset()
     return source if isinstance(source, xr.Dataset) else open_dataset(Path(source))
 
 
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
-    """The figure of a dataset, of whatever kind it is."""
+    """Draw a dataset of any kind."""
     found = kind(dataset)
     if found and found in _OWN and (found != CRITICAL or variable is None):
         options = {"variable": variable if found != TRAJECTORY else None, **axes, **how}
@@ -161,7 +162,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
             raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
         require_whole(dataset)
         return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
-    chosen = panels.choose(dataset, variable, **axes)
+    chosen = panels.choose(dataset, variable, **axes, alone=is_column())
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:
         return maps.draw(chosen, **how)
@@ -173,12 +174,12 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
 def _of_size(
     draw: Callable[[], Picture], size: tuple[float, float] | None, across: float | None, *, title: bool
 ) -> Picture:
-    """The figure that `draw` makes, of a size, or as wide as this for print, in inches.
+    """Draw a figure of a given size, or of a given width for print, in inches.
 
     Raises
     ------
     ConfigError
-        if that is too small, with a size that is not.
+        if the size is too small; the message gives one that suffices.
     """
 
     def of(scale: float) -> tuple[Picture, bool]:
@@ -202,11 +203,11 @@ def _of_size(
         enough *= 2
     scale = _GROWTH ** bisect_left(range(enough), True, enough // 2 + 1, key=lambda k: of(_GROWTH**k)[1])
     wide = across or float(mpl.rcParams["figure.figsize"][0])
-    told, needed = (
+    given, needed = (
         f"{size[0] * by:.3g} × {size[1] * by:.3g} inches" if size else f"{ceil(wide * by * 25.4 - 1e-6)}mm"
         for by in (1, scale)
     )
-    words = f"{told} is too small for this figure; give {needed}, or choose a smaller text"
+    words = f"{given} is too small for this figure; give {needed}, or choose a smaller text"
     raise fault_of(words, "figsize" if size else "width" if across else "figure.figsize")
 
 
@@ -241,13 +242,13 @@ def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None) -> list[
 
 
 def _is_pair(given: Any) -> bool:
-    """Tell whether an argument is two finite numbers."""
+    """Return whether an argument is a pair of finite numbers."""
     there = plain_data(given)
     return isinstance(there, list) and len(there) == 2 and all(is_number(n) and isfinite(n) for n in there)
 
 
 def inches(width: str) -> float:
-    """Return a length such as "85mm" in inches; `ConfigError` if it is none, or none for a figure."""
+    """Return a length such as "85mm" in inches; `ConfigError` if it is not a length that a figure can have."""
     length, error = quantity(str(width), LENGTH) or (0.0, 0.0)
     if error or not _NARROWEST <= length <= _WIDEST:
         span = f"between {_NARROWEST * 1e3:g} and {_WIDEST * 1e3:g} mm"

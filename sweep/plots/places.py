@@ -1,4 +1,4 @@
-"""Says where words stand on the lines of a map: counts on boundaries, and symbols on critical spins.
+"""Place words on the lines of a map: counts on boundaries, and symbols on critical spins.
 
 Without any library that draws.
 """
@@ -6,6 +6,7 @@ Without any library that draws.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,34 +14,55 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots.theory import Line, Points
 
-_HALF = 0.03
+_HALF = np.array([0.045, 0.035])
 """Half the width and height of a word, as a share of the map."""
 
 _LARGE = 0.25
-"""How large the parts of lines are that need a word, as a share of the map."""
+"""Smallest size of a part of a line that needs a word, as a share of the map."""
 
 Word = tuple[float, float, str]
 """x, y and the symbol of a line."""
 
 
-def words(lines: Iterable[Line], x: Axis, y: Axis) -> Iterator[Word]:
-    """Where the symbols of lines are written on a map: near the middle of each part, and off others and the edges.
+def legible(lines: Iterable[Line], x: Axis, y: Axis, *, room: bool = True) -> tuple[list[Line], list[Word]]:
+    """The lines of a map to draw, and the words on them.
 
-    Small parts have none, unless they are the largest of their line, and neither have parts without room for one.
+    A boundary means nothing without its number: parts that have no room for one are left out, and all boundaries of a
+    map without `room` for words.
     """
+    ordered = sorted(lines, key=lambda line: line.name != "boundary")
+    placed = list(_placed(ordered, x, y)) if room else []
+    numbered = {id(part) for _, part in placed}
+    drawn = [
+        replace(line, parts=[part for part in line.parts if line.name != "boundary" or id(part) in numbered])
+        for line in ordered
+    ]
+    return [line for line in drawn if line.parts], [word for word, _ in placed]
+
+
+def words(lines: Iterable[Line], x: Axis, y: Axis) -> Iterator[Word]:
+    """Place the symbols of lines on a map: near the middle of each part, off other symbols and the edges.
+
+    Small parts have none, unless they are the largest of their line; nor have parts without room for one.
+    """
+    return (word for word, _ in _placed(lines, x, y))
+
+
+def _placed(lines: Iterable[Line], x: Axis, y: Axis) -> Iterator[tuple[Word, Points]]:
+    """Each word, and the part of a line on which it stands."""
     taken = np.empty((0, 2))
-    for line in lines:
-        placed = [(np.stack(part, axis=1), _shares(part, x, y)) for part in line.parts]
-        inside = [(((at >= 0) & (at <= 1)).all(axis=1), points, at) for points, at in placed]
-        parts = [(points[kept], at[kept]) for kept, points, at in inside if kept.any()]
-        sizes = [np.ptp(at, axis=0).max() for _, at in parts]
-        for (points, at), size in zip(parts, sizes, strict=True):
+    for line in (each for each in lines if each.symbol):
+        shares = [(part, np.stack(part, axis=1), _shares(part, x, y)) for part in line.parts]
+        inside = [(((at >= 0) & (at <= 1)).all(axis=1), part, points, at) for part, points, at in shares]
+        parts = [(part, points[within], at[within]) for within, part, points, at in inside if within.any()]
+        sizes = [np.ptp(at, axis=0).max() for *_, at in parts]
+        for (part, points, at), size in zip(parts, sizes, strict=True):
             apart = np.any(np.abs(at[:, None] - taken) > 2 * _HALF, axis=2).all(axis=1)
             free = np.flatnonzero(apart & (np.abs(at - 0.5) < 0.5 - _HALF).all(axis=1))
             if free.size and size >= min(_LARGE, max(sizes)):
                 k = free[np.abs(free - len(at) // 2).argmin()]
                 taken = np.vstack([taken, at[k]])
-                yield float(points[k, 0]), float(points[k, 1]), line.symbol
+                yield (float(points[k, 0]), float(points[k, 1]), line.symbol), part
 
 
 def _shares(part: Points, x: Axis, y: Axis) -> Array:

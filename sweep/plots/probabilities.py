@@ -1,4 +1,4 @@
-"""How probable each number of reversals is: bars of one scene, or curves over one axis, with their intervals."""
+"""Probabilities of reversal counts: bars for one scene or curves over one axis, with their intervals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.figure import Frames, say_nothing, set_scale
+from sweep.plots.figure import Frames, set_scale, write_words
 from sweep.plots.panels import Panels, title
 from sweep.plots.scales import Limits
 from sweep.results.probabilities import interval, sound
@@ -30,7 +30,7 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
         else:
             _curves(axes, chosen, panels.across[0])
         if chosen["probability"].isnull().all():
-            say_nothing(axes, "all samples failed" if "status" in chosen else "no probability is known")
+            write_words(axes, "all samples failed" if "status" in chosen else "no probability is known")
         axes.set_ylim(limits or (0, 1.02))
         axes.grid(alpha=0.3)
     shown = [axes for axes, chosen in frames if chosen["probability"].notnull().any()]
@@ -60,7 +60,7 @@ def _bars(axes: Axes, chosen: xr.Dataset, *, lowest: bool) -> None:
     share: Array = np.array([more - still for more, still in pairwise(at_least)])
     axes.bar(np.arange(len(share)), share, color="C0", label="share of the samples", zorder=2)
     axes.set_xlim(-0.6, len(share) - 0.4)
-    if "status" in chosen and labels.is_code(chosen["status"]):  # else nobody knows how many samples there are
+    if "status" in chosen and labels.is_code(chosen["status"]):  # otherwise the number of samples is unknown
         low, high = interval(share, np.asarray(sound(chosen).sum()))
         axes.errorbar(
             np.arange(len(share)), share, yerr=[share - low, high - share],

@@ -1,6 +1,6 @@
-"""Says what can be drawn of a dataset: its variables, what is derived from them, and which of these it is about.
+"""List what can be drawn of a dataset: its variables, quantities derived from them, and its subject.
 
-Pictures and the explorer both ask here.  From the dataset alone, and without any library that draws.
+Pictures and the explorer share these.  From the dataset alone, and without any library that draws.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sweep.results.probabilities import PROBABILITIES
 
 @dataclass(frozen=True)
 class Derived:
-    """A quantity that no dataset stores."""
+    """A quantity computed from the variables of a dataset."""
 
     needs: tuple[str, ...]
     """The variables from which it is derived."""
@@ -47,12 +47,12 @@ DERIVED = {
 reversal is simulated as predicted; `regime`: see `sweep.plots.regimes`."""
 
 COMPARISONS = {"difference": DERIVED["difference"].needs, "ratio": DERIVED["ratio"].needs}
-"""What these compare, a simulated variable and its prediction, which their figures show as well."""
+"""The simulated variable and the prediction that each compares, which their figures show as well."""
 
 _SUBJECTS = (
     "misfit", "probability", "reversals", "reversals_predicted", "t_first_reversal", "lyapunov", "spin_final",
 )  # fmt: skip
-"""What a dataset may be about; it is about the first that it has."""
+"""Possible subjects of a dataset, in order of preference."""
 
 
 def derivable(dataset: xr.Dataset) -> list[str]:
@@ -75,7 +75,7 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
     if name not in dataset.data_vars:
         if not (choices := [*map(str, dataset.data_vars), *possible]):
             raise fault_of("the dataset has no variable to draw")
-        words = f"there is no variable {name}" if name else "none of the variables is drawn unless it is named"
+        words = f"there is no variable {name}" if name else "name the variable to draw"
         raise fault_of(f"{words}{suggestion(name, choices)}; choose {either(choices)}", "variable")
     return dataset[name]
 
@@ -115,9 +115,9 @@ def subject(dataset: xr.Dataset) -> str:
 
 
 def first_picture(dataset: xr.Dataset) -> str:
-    """What is drawn of a dataset where no variable is named: its `subject`, compared with a prediction if there is one.
+    """Return what to draw of a dataset by default: its `subject`, compared with a prediction if there is one.
 
-    A picture that the configuration names is drawn as it is.
+    A picture named in the configuration is drawn without a comparison.
     """
     about = subject(dataset)
     compared = (name for name in COMPARISONS if name in derivable(dataset) and about == COMPARISONS[name][0])

@@ -1,4 +1,4 @@
-"""Regimes of motion: what becomes of a body, told from what a run has measured of it.
+"""Regimes of motion: the long-term behaviour of a body, inferred from the measurements of a run.
 
 From the dataset alone, and without any library that draws.
 """
@@ -14,7 +14,7 @@ REGIMES = ("settles", "few_reversals", "reverses_regularly", "wanders", "undecid
 """The names of the regimes, whose codes are their places.  A cell is of the first whose condition it meets."""
 
 FEWEST = 4
-"""Reversals below which nothing is said about their regularity: two cycles."""
+"""Reversals needed to judge their regularity: two cycles."""
 
 SAME = 0.01
 """Variation of the cycles, relative to their mean, below which a body reverses regularly."""
@@ -23,7 +23,7 @@ SURE = 3.0
 """Standard errors above zero beyond which a Lyapunov exponent is taken for positive."""
 
 NEEDS = ("status", "reversals", "cycle_variation", "lyapunov", "lyapunov_error")
-"""The variables from which the regime is told."""
+"""The variables from which the regime is inferred."""
 
 
 def regimes(dataset: xr.Dataset) -> xr.DataArray:

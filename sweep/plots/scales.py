@@ -1,4 +1,4 @@
-"""Colour scales: what colour a value has, and what stands beside the bar.
+"""Colour scales: the colours of values, and the ticks of a colour bar.
 
 All maps get steadily lighter or, about zero, steadily darker on both sides, so that they can be read in grey.
 """
@@ -39,12 +39,12 @@ LARGEST = 10**15
 
 @dataclass(frozen=True)
 class Scale:
-    """How values become colours."""
+    """A mapping from values to colours."""
 
     colours: Colormap
     norm: Normalize
     ticks: dict[float, str] | None = None
-    """What stands beside the bar, and where; chosen by the library that draws if None."""
+    """Labels of the bar, by value; None leaves them to the library that draws."""
     arrows: Arrows = "neither"
     """Ends of the bar beyond which there are values."""
 
@@ -170,6 +170,11 @@ def _stepped(steps: Array, values: Array, name: str) -> Scale:
     norm = BoundaryNorm(steps - 0.5, number, extend=arrows)
     nearest_zero = (min(first, last - 1, key=abs) for first, last in pairwise(steps.tolist()))
     ticks = {float(count): f"{count}".replace("-", "−") for count in nearest_zero}
-    every = -(-len(ticks) // _MAX_TICKS)
-    start = list(ticks).index(0) % every if 0 in ticks else 0  # of differences, zero is always labelled
-    return Scale(colour_map(name).resampled(number), norm, dict(list(ticks.items())[start::every]), arrows)
+    return Scale(colour_map(name).resampled(number), norm, thinned(ticks, _MAX_TICKS), arrows)
+
+
+def thinned(ticks: dict[float, str], most: int) -> dict[float, str]:
+    """At most so many ticks, evenly chosen, among them zero."""
+    every = -(-len(ticks) // max(most, 1))
+    start = list(ticks).index(0) % every if 0 in ticks else 0
+    return dict(list(ticks.items())[start::every])

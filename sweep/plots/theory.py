@@ -1,4 +1,4 @@
-"""Says what theory says of a picture: the critical spins, which explain edges, and the shape of the largest L(f).
+"""Lines that theory adds to a picture: critical spins, which explain edges, and the shape of largest form factor.
 
 From the dataset alone, and without any library that draws.
 """
@@ -23,15 +23,15 @@ _SOURCES = {
     "n_c1": (("_linear", "eigenvalues"), ("", "formula")),
     "n_c2": (("_simulated", "simulation"), ("", "formula")),
 }
-"""Where a critical spin comes from: the full model if the dataset has it, else the formula of Takano (2011)."""
+"""Sources of a critical spin: the full model if the dataset has it, else the formula of Takano (2011)."""
 
-WORDS = {"n_c1": "a tiny rattle grows", "n_c2": "the spin reverses"}
+WORDS = {"n_c1": "rattle grows", "n_c2": "reversal"}
 
 STYLES = {"n_c1": ("dotted", 1.2), "n_c2": ("solid", 1.2), "best": ("dashed", 1.2), "boundary": ("solid", 0.6)}
-"""How the lines over a map are dashed, and their widths in points."""
+"""Dashes of the lines over a map, and their widths in points."""
 
 OVER_TIME = {"n_c2": "dashed", "n_c1": "dotted"}
-"""How critical spins are dashed beside the curve of a spin."""
+"""Dashes of critical spins over time."""
 
 Points = tuple[Array, Array]
 """x and y of a line."""
@@ -42,13 +42,13 @@ class Line:
     """A line over a map or, at some values of x, over curves."""
 
     name: str
-    """What decides its style: `n_c1`, `n_c2`, `boundary`, or `best` for the shape of the largest form factor."""
+    """Key of its style: `n_c1`, `n_c2`, `boundary`, or `best` for the shape of the largest form factor."""
     words: str
-    """What a legend says of it, with symbols such as n_c1."""
+    """Its legend entry, with symbols such as n_c1."""
     parts: list[Points]
     """Over curves, y is empty."""
     symbol: str = ""
-    """What stands beside it, such as n_c1⁺, or on it: the count that begins on a boundary."""
+    """The label on it: n_c1⁺ and the like, or the count that begins on a boundary."""
 
 
 def critical_spins(dataset: xr.Dataset, name: str) -> Iterator[tuple[str, xr.DataArray, str]]:
@@ -68,9 +68,8 @@ def levels(one: xr.Dataset) -> list[tuple[str, str, float, str]]:
 
 def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:
     """Word a legend for n_c1 or n_c2, in figures over the spin or over other parameters."""
-    if over_n0:
-        return f"{name} ({source}): {WORDS[name]} where |{spin}| is larger"
-    return f"{spin} = {name} ({source}): {WORDS[name]} where that is smaller"
+    where = f"|{spin}| is larger" if over_n0 else f"{name} < {spin}"
+    return f"{name} ({source}): {WORDS[name]} where {where}"
 
 
 def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
@@ -88,7 +87,7 @@ def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
 
 
 def crossings(dataset: xr.Dataset, x: Axis) -> list[Line]:
-    """Where along the one axis `x` of curves the start spin passes a critical spin, and where L(f) is largest."""
+    """Find where the start spin passes a critical spin along the axis `x` of curves, and where L(f) is largest."""
     found = list[Line]()
     for name, sign, values, source in _explaining(dataset, x) if x.name else ():
         at = (x if x.name == "n0" else _axis(values, x)).values
@@ -105,9 +104,9 @@ def crossings(dataset: xr.Dataset, x: Axis) -> list[Line]:
 
 
 def _explaining(dataset: xr.Dataset, *axes: Axis) -> Iterator[tuple[str, str, xr.DataArray, str]]:
-    """The name, symbol, values and source of the critical spins that vary over no other axes, beside a start spin.
+    """Yield name, symbol, values and source of the critical spins that depend on these axes alone.
 
-    The values are those between the cells, as far as they can be had.
+    Values between the cells are computed where possible.
     """
     across = {axis.name for axis in axes}
     if "n0" not in dataset.coords or not set(dataset["n0"].dims) <= across & {"n0"}:
@@ -128,7 +127,7 @@ def best_shape(dataset: xr.Dataset) -> float | None:
 
 
 def _best_words(b: float) -> str:
-    return f"b = {b:.2f}, where the form factor L(f) is largest"
+    return f"b = {b:.2f}: largest form factor L(f)"
 
 
 def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
@@ -142,7 +141,7 @@ def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
 
 
 def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
-    """Where a critical spin equals the start spin of the map."""
+    """Return the contours on which a critical spin equals the start spin of the map."""
     across, up = _axis(values, x), _axis(values, y)
     template = xr.DataArray(np.zeros((len(up.values), len(across.values))), dims=(y.name, x.name))
     field = values.drop_vars(values.coords).broadcast_like(template).transpose(y.name, x.name).values

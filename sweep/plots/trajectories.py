@@ -13,10 +13,11 @@ from matplotlib.lines import Line2D
 
 from sweep.faults import fault_of
 from sweep.grid import SAMPLE, Array
+from sweep.kernels.status import SETTLED
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
-from sweep.plots.figure import Picture, page, panel_width, zero_line
+from sweep.plots.figure import Picture, is_column, panel_width, zero_line
 from sweep.results.kind import is_of_own_body, parameters
 
 # Title and the series drawn together; two panels stand beside each other.
@@ -39,20 +40,20 @@ _MOST_ENTRIES = 12
 _SHADES = (0.55, 1.0)
 """Opacity of the first and of the second series of a panel."""
 
-_STILL = 0.01
-"""Changes smaller than this share of a series' range are not worth a look."""
+_STILL = 0.05
+"""Share of a series' range below which a change is no event."""
+
+_WHILE = 1.4
+"""End of the time axis, relative to the time of the last event."""
 
 _ENDLESS = ("heading", "table_x", "table_y")
 """Series that go on where a body spins steadily."""
 
-_NARROW = 6.0
-"""Inches of a page up to which panels stand below each other."""
-
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
-    """The spin with its reversals and critical values over time, and below it whatever else the dataset has.
+    """Draw the spin with its reversals and critical values over time, and below it the other series of the dataset.
 
-    Where the bodies come to rest early, the time axis ends there, and says so.
+    The time axis ends a while after the last event (`lively_until`).  In a column of text, the spin stands alone.
 
     Parameters
     ----------
@@ -66,32 +67,30 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     series = [str(name) for name, v in dataset.data_vars.items() if "time" in v.dims]
     if variable is not None and variable not in series:
         raise fault_of(f"there is no series {variable}; choose {', '.join(series)}", "variable")
-    alone = variable is not None or SAMPLE in dataset.coords
+    alone = variable is not None or SAMPLE in dataset.coords or is_column()
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and not alone]
     if is_of_own_body(dataset) and not alone:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
-    columns = 2 if page() > _NARROW else 1
-    rows = -(-len(panels) // columns)
+    rows = -(-len(panels) // 2)
     figure = Picture(panel_width(1, 11, 0), 4.2 + 1.9 * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(constants_apart(dataset)))
-    grid = figure.add_gridspec(1 + rows, columns, height_ratios=[2] + [1] * rows)
+    grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
     entries = _series(first, dataset, only) if only else _spin(first, dataset)
-    time, until, last = labels.label(dataset, "time"), lively_until(dataset), float(dataset["time"].max())
-    if until < last:
-        first.set_xlim(0, until)
-        apart = " " if columns > 1 else "\n"
-        time = f"{time};{apart}nothing changes by more than {_STILL:.0%} from here to {last:g}"
-    below = [figure.add_subplot(grid[1 + k // columns, k % columns], sharex=first) for k in range(len(panels))]
+    first.set_xlim(0, lively_until(dataset))
+    odd = len(panels) % 2  # the last of an odd number of panels is as wide as the spin
+    places = [grid[1 + k // 2, k % 2 if k + odd < len(panels) else slice(None)] for k in range(len(panels))]
+    below = [figure.add_subplot(place, sharex=first) for place in places]
     for axes, (title, names) in zip(below, panels, strict=True):
         _series(axes, dataset, names)
-        axes.set_title(title, loc="left", pad=16 if columns == 1 < len(names) else None)
-    for axes in below[:-columns]:
-        axes.tick_params(labelbottom=False)
-    for axes in (below or [first])[-columns:]:
-        axes.set_xlabel(time)
+        axes.set_title(title, loc="left")
+    lowest = (below or [first])[-1 if odd else -2 :]
+    for axes in (first, *below):
+        axes.tick_params(labelbottom=axes in lowest or axes is first)
+    for axes in lowest:
+        axes.set_xlabel(labels.label(dataset, "time"))
     figure.explain(entries)
     return figure
 
@@ -110,7 +109,7 @@ def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist
     entries = _series(axes, dataset, {"spin": "spin n"})
     zero_line(axes)
     entries.append(Line2D([], [], linestyle="none", marker="o", color="0.4", markersize=4, label="reversal"))
-    # Of samples, each may be another body.
+    # Each sample may be a different body.
     return entries + (_critical_spins(axes, dataset) if critical and SAMPLE not in dataset.coords else [])
 
 
@@ -158,32 +157,44 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
 
 
 def lively_until(dataset: xr.Dataset) -> float:
-    """A quarter beyond the time of the last reversal, and of the last change of any series by a share of its range.
+    """The time a while after the last event: what a time axis shows, at most to the end of the series.
 
-    Heading and path, which no spin leaves alone, do not count.
-
-    The end of the series if that is not much later.
+    The last event of a body that has settled is its last reversal.  That of any other body is the last notable change
+    of a series other than heading and path, which go on for ever.
     """
-    at = dataset["time"].values
-    last = float(dataset["t_last_reversal"].fillna(0.0).max()) if "t_last_reversal" in dataset else 0.0
-    for values in (v.values for name, v in dataset.data_vars.items() if "time" in v.dims and name not in _ENDLESS):
-        if not (known := np.isfinite(values)).any():
-            continue
-        ends = np.take_along_axis(values, known.cumsum(axis=-1).argmax(axis=-1)[..., None], axis=-1)
-        lively = known & (np.abs(values - ends) > _STILL * np.nanmax(np.abs(values - ends)))
-        last = max(last, float(at[lively.reshape(-1, len(at)).any(axis=0)].max(initial=0.0)))
-    return 1.25 * last if 0 < 1.5 * last < at[-1] else float(at[-1])
+    last = max(_last_event(one) for one in _each(dataset))
+    end = float(dataset["time"][-1])
+    return min(_WHILE * last, end) if last else end
+
+
+def _each(dataset: xr.Dataset) -> list[xr.Dataset]:
+    """The single trajectories of a dataset, or the one that it is."""
+    count = dataset.sizes.get("trajectory")
+    return [dataset] if count is None else [dataset.isel(trajectory=i) for i in range(count)]
+
+
+def _last_event(one: xr.Dataset) -> float:
+    """The time of the last event of one trajectory, as `lively_until` has it; zero if nothing happens."""
+    reversals = reversal_times(one)
+    if len(reversals) and "status" in one and one["status"] == SETTLED:
+        return float(reversals[-1])
+    at, last = one["time"].values, 0.0
+    for values in (v.values for name, v in one.data_vars.items() if v.dims == ("time",) and name not in _ENDLESS):
+        known = np.isfinite(values)
+        change = np.abs(values[known] - values[known][-1:])
+        last = max(last, at[known][change > _STILL * change.max(initial=0.0)].max(initial=0.0))
+    return float(last)
 
 
 def reversal_times(one: xr.Dataset) -> Array:
-    """Times at which the ripple-free spin of one trajectory, averaged over a period of the rattle, changes sign.
+    """Find the times at which the spin of one trajectory changes sign, averaged over a period of the rattle.
 
-    Of a user's model, the spin as it is.
+    The period of a user-defined model is unknown, and its spin is taken as it is.
     """
     if "ripple_free_spin" not in one:
         return np.array([])
     time, spin = one["time"].values, one["ripple_free_spin"].values
-    if not is_of_own_body(one):  # whose period nobody knows
+    if not is_of_own_body(one):
         columns = {name: np.atleast_1d(one[name].values) for name in rigid_body.PARAMETERS if name in one}
         surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
         tau = float(rigid_body.slower_period(columns, surface)[0])

@@ -386,7 +386,7 @@ def test_news_of_a_page_that_is_gone_end_its_run_alone(opened: xr.Dataset) -> No
     document, job = Document(), Job({}, lambda _: None)
     view = View(document, Source(opened), None, None, {})
     document.callbacks.destroy()
-    view._tell(job)
+    view._report(job)
     assert job.dropped
 
 
@@ -545,6 +545,32 @@ def test_the_page_is_dark_where_the_system_is(visit: Open, opened: xr.Dataset) -
     page.reload()
     settle(page)
     assert min(grounds()[:3]) > 240
+
+
+@pytest.mark.parametrize("width", [1000, 1600])
+def test_a_click_shows_its_curves_without_scrolling(visit: Open, width: int) -> None:
+    page = visit("n0=0.05")
+    page.set_viewport_size({"width": width, "height": 950})
+    page.mouse.click(*place(settle(page), 1, 1))
+    wait_for_curves(page, 1)
+    for name in ("#map", "#curves"):
+        box = page.locator(name).first.bounding_box()
+        assert box
+        assert box["y"] + box["height"] <= 950
+    assert page.evaluate("scrollY") == 0
+    # News of a run stand between the parts of the page, not over them.
+    assert page.evaluate("getComputedStyle(document.querySelector('#notice')).position") == "static"
+    page.close()
+
+
+def test_the_tooltip_of_a_dark_page_is_dark(page: Page) -> None:
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_function("document.documentElement.dataset.theme === 'dark'")
+    page.mouse.move(*place(page, 1, 1))
+    tip = page.locator(".bk-Tooltip").first
+    tip.wait_for()
+    colour = tip.evaluate("e => getComputedStyle(e).backgroundColor")
+    assert max(map(int, re.findall(r"\d+", colour)[:3])) < 60
 
 
 def test_nothing_runs_out_of_the_window(clicked: Page) -> None:

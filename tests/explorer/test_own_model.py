@@ -45,7 +45,7 @@ def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest
         Setup(source)
     why = f"Its model is code of a user, {folder / 'pendulum.py'}, and runs only if you name it: "
     assert why_still(source) == f"{why}sweep explore FILE --model MODEL."
-    assert source.describe({"damping": 0, "torque": 1})
+    assert source.values_at({"damping": 0, "torque": 1})
 
 
 def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, folder: Path) -> None:

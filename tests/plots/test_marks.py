@@ -56,7 +56,7 @@ def test_a_missing_value_of_a_sound_run_is_no_failure(cells: xr.Dataset) -> None
 
 def test_a_final_spin_is_no_lower_bound(cells: xr.Dataset) -> None:
     words = legend(cells, "spin_final")
-    assert words["time_limit"] == "not settled: ended at the time limit (1 of 6)"
+    assert words["time_limit"] == "not settled: reached the time limit (1 of 6)"
     assert "uncertain" not in words
 
 

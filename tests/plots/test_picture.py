@@ -31,12 +31,53 @@ def marked(axes: Axes, kind: str) -> list[Any]:
 
 def test_simulated_predicted_and_their_difference_stand_side_by_side() -> None:
     figure = picture.plot(made())
-    assert [axes.get_title().split(",")[0] for axes in maps(figure)] == [
+    assert [axes.get_title().split("\n")[0] for axes in maps(figure)] == [
         "simulated", "predicted (Takano 2011)", "simulated − predicted",
     ]  # fmt: skip
     simulated, predicted, difference = map(mesh, maps(figure))
     assert simulated.norm is predicted.norm or (simulated.norm.boundaries == predicted.norm.boundaries).all()
     assert (difference.get_array() == -2).all()
+
+
+@pytest.mark.parametrize("size", [{}, {"width": "180mm"}])
+def test_a_variable_has_one_scale_and_one_bar_in_a_figure(size: dict[str, str]) -> None:
+    dataset = made(n0=[0.02, 0.05, 0.1])
+    dataset["reversals"] = dataset["reversals"] + xr.DataArray([0, 4, 9], dims="n0").astype("int16")
+    figure = picture.plot(dataset, **size)
+    simulated, predicted, difference = (maps(figure)[i::3] for i in range(3))
+    for alike, value in (([*simulated, *predicted], 11), (difference, -2)):
+        assert len({tuple(mesh(axes).norm.boundaries) for axes in alike}) == 1
+        assert len({tuple(mesh(axes).cmap(mesh(axes).norm(value))) for axes in alike}) == 1
+    bars = [axes.get_ylabel() for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    assert bars == ["spin reversals", "simulated − predicted"]
+
+
+@pytest.mark.parametrize("width", [None, "85mm", "180mm"])
+def test_a_boundary_is_drawn_with_its_number_or_not_at_all(width: str | None) -> None:
+    one = made(n0=[0.02, 0.05])
+    one = one.assign(margin_more=one.spin_final * 0 + 0.5, margin_fewer=one.spin_final * 0 + 0.5)
+    figure = picture.plot(one, width=width)
+    for axes in maps(figure):
+        lines = [line for line in axes.lines if line.get_gid() == "boundary"]
+        numbers = [text.get_position() for text in axes.texts if text.get_text().isdigit()]
+        assert len(lines) == len(numbers)
+        assert all(any((line.get_xydata() == at).all(axis=1).any() for line in lines) for at in numbers)
+    assert any("boundary" in text for text in entries(figure)) == (width != "85mm")
+
+
+def test_dots_at_uncertain_cells_can_be_seen_on_a_large_map() -> None:
+    dataset = made(mu=np.linspace(20, 200, 60), b=np.linspace(2, 9, 60))
+    dataset["sensitive"] = dataset["noise_limited"] + 1
+    (dots,) = [line for line in maps(picture.plot(dataset, "reversals"))[0].lines if line.get_gid() == "uncertain"]
+    assert dots.get_markersize() >= 2
+
+
+def test_a_single_cell_is_written_not_drawn() -> None:
+    (axes,) = picture.plot(made(), sel={"mu": 80, "b": 3, "n0": 0.05}).axes
+    assert not axes.axison
+    assert not axes.lines
+    (text,) = axes.texts
+    assert text.get_text().split("\n") == ["spin reversals, simulated: 4", "spin reversals, predicted (Takano 2011): 6"]
 
 
 def test_a_map_reads_no_more_of_a_file_than_it_shows(tmp_path: Path) -> None:
@@ -163,7 +204,7 @@ def test_theory_is_drawn_over_reversals_alone() -> None:
     for variable, lines in (("reversals", {"best", "n_c1", "n_c2"}), ("status", set()), ("spin_final", set())):
         axes = maps(picture.plot(made(n0=[0.02]), variable))[0]
         assert {artist.get_gid() for artist in axes.lines if artist.get_gid()} == lines
-    assert any("L(f) is largest" in text for text in entries(picture.plot(made())))
+    assert any("largest form factor L(f)" in text for text in entries(picture.plot(made())))
 
 
 def test_a_status_is_told_in_words() -> None:
@@ -171,7 +212,7 @@ def test_a_status_is_told_in_words() -> None:
     assert entries(figure) == ["settled (79 of 80)", "ended at the time limit (1 of 80)"]
     assert len(figure.axes) == 1  # and no bar with numbers
     several = picture.plot(made(n0=[0.02, 0.05]), "status")  # whose words alone would not say what they are about
-    assert maps(several)[0].get_title() == "how the trajectory ended, n₀ = 0.02"
+    assert maps(several)[0].get_title() == "how the trajectory ended\nn₀ = 0.02"
 
 
 @pytest.mark.parametrize("variable", [None, "status", "difference", "t_last_reversal"])

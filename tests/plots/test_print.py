@@ -49,12 +49,21 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
     assert all(axes.get_window_extent().width > 0.3 * figure.bbox.width / 3 for axes in panels)
 
 
-def test_maps_that_do_not_fit_side_by_side_stand_below_each_other() -> None:
-    one = made()
-    for width, columns in (("85mm", 1), ("180mm", 3)):
-        panels = [axes for axes in picture.plot(one, width=width).axes if axes.get_label() == ""]
-        assert len({axes.get_subplotspec().colspan.start for axes in panels}) == columns
-        assert len(panels) == 3
+@pytest.mark.parametrize("starts", [1, 2, 3, 8])
+@pytest.mark.parametrize("variable", [None, "difference"])
+def test_a_figure_for_a_column_has_one_bar_and_is_no_page(starts: int, variable: str | None) -> None:
+    figure = picture.plot(made(n0=np.linspace(0.02, 0.1, starts)), variable, x="b", y="mu", width="85mm")
+    panels = [axes for axes in figure.axes if axes.get_label() == ""]
+    assert len(panels) == starts
+    assert len(figure.axes) == starts + 1
+    assert len({axes.get_subplotspec().colspan.start for axes in panels}) == min(starts, 3)
+    assert figure.get_figheight() * 25.4 < 130
+    assert min(axes.bbox.width for axes in panels) > 14 / 25.4 * figure.dpi
+
+
+def test_a_wide_figure_compares_maps_side_by_side() -> None:
+    panels = [axes for axes in picture.plot(made(), width="180mm").axes if axes.get_label() == ""]
+    assert [axes.get_subplotspec().colspan.start for axes in panels] == [0, 1, 2]
 
 
 @pytest.mark.parametrize("suffix", ["pdf", "eps"])
@@ -137,5 +146,5 @@ def test_a_variable_is_drawn_without_its_dataset() -> None:
     figure = picture.plot(made().reversals)
     assert len([axes for axes in figure.axes if axes.get_label() == ""]) == 1
     assert not [text for text in entries(figure) if "time limit" in text]
-    with pytest.raises(ValueError, match="an array without a name is no variable of a run; give the dataset"):
+    with pytest.raises(ValueError, match="an array without a name is not a variable of a run; pass the dataset"):
         picture.plot(made().reversals - made().reversals_predicted)

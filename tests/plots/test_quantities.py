@@ -119,7 +119,7 @@ def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
 def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None:
     source = Source(whole)
     for (i, j), regime in (((1, 1), "reverses regularly"), ((1, 5), "undecided")):
-        told = source.describe({"n0": i, "delta": j})
+        told = source.values_at({"n0": i, "delta": j})
         assert told["regime of motion"] == regime
         assert told["first reversal, simulated / predicted"] == "1.25"
         assert told["simulated − predicted"] == "+2"

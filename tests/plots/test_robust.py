@@ -75,7 +75,7 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
         (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "the axis mu has no values; select at least one"),
         (lambda d: d.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
         (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
-        (lambda d: d[["n_c1_plus"]], "none of the variables is drawn unless it is named; choose n_c1_plus"),
+        (lambda d: d[["n_c1_plus"]], "name the variable to draw; choose n_c1_plus"),
         (lambda d: d[["n_c1_plus"]].drop_vars("n_c1_plus").assign_attrs(sweep_kind="run"), "has no variable to draw"),
     ],
 )

@@ -10,7 +10,7 @@ from support import Write
 from support.cli import invoke, refused
 from support.figures import constants, entries
 
-from sweep.kernels.status import SETTLED
+from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.plots import picture
 from sweep.plots.figure import constants_in_lines
 from sweep.results.dataset import VARIABLES
@@ -97,6 +97,26 @@ def test_samples_are_lines_of_the_spin_alone() -> None:
     (axes,) = figure.axes
     assert sum(line.get_gid() == "spin" for line in axes.lines) == 20
     assert entries(figure)[12] == "and 8 more"
+
+
+def test_the_time_axis_ends_a_while_after_the_last_event() -> None:
+    turning, still = made([60, 100]), made([60])
+    time = turning["time"]
+    turning["ripple_free_spin"] = xr.DataArray([8.25, 17.75], dims="trajectory") - time
+    turning.attrs = {"model_brings": "a model"}
+    for dataset, end in ((turning, 1.4 * 17.75), (still, 100)):
+        for axes in picture.plot(dataset).axes:
+            assert axes.get_xlim() == (0, pytest.approx(end))
+            assert axes.get_xlabel() in ("", "time t (√(c/g))")
+    turning["status"][1] = TIME_LIMIT  # its next reversal may be about to come
+    assert picture.plot(turning).axes[0].get_xlim() == (0, 100)
+
+
+def test_a_column_shows_the_spin_alone() -> None:
+    figure = picture.plot(made([60, 100]), width="85mm")
+    (axes,) = figure.axes
+    assert {"spin"} <= {line.get_gid() for line in axes.lines}
+    assert figure.get_figheight() * 25.4 < 130
 
 
 def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
