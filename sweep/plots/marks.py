@@ -17,7 +17,7 @@ from sweep.results.dataset import STATUS_WORDS, VARIABLES
 WORDS = {
     "not_run": "not run",
     "failed": "failed",
-    "impossible": "impossible body, or one that does not stand upright",
+    "impossible": "impossible body, or one that cannot stand",
     "no_value": "no value",
     "time_limit": "lower bound: reached the time limit",
     "inferred": "inferred from neighbouring cells, not simulated",
