@@ -21,9 +21,9 @@ HOSTILE = {
     "high=1e16": "high=1e16: give a number from ",
     "low=3&high=3": "low is not below high; ",
     "&".join(f"key{k}=1" for k in range(5000)): "unknown URL parameter 'key0', 'key1', 'key2', 'key3', 'key4' …; ",
-    "cell=__class__:1": "cell=__class__:1: __class__ is no parameter; there are ",
+    "cell=__class__:1": "cell=__class__:1: __class__ is not a parameter; choose ",
     "cell=mu:-1": "cell=mu:-1: mu has to be a finite number >= 0",
-    "cell=:": "cell=::  is no parameter",
+    "cell=:": "cell=::  is not a parameter",
 }
 """What is said of an address that asks for what is not there."""
 
