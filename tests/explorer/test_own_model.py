@@ -43,7 +43,7 @@ def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest
     assert usable(source) is None
     with pytest.raises(ConfigError, match="refusing to run user code named inside a da"):
         Setup(source)
-    why = f"Its model is code of a user, {folder / 'pendulum.py'}, and runs only if you name it: "
+    why = f"Its model is user code, {folder / 'pendulum.py'}; name it to run trajectories: "
     assert why_still(source) == f"{why}sweep explore FILE --model MODEL."
     assert source.values_at({"damping": 0, "torque": 1})
 

@@ -101,7 +101,10 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
     stretch = ("--from", "2", "--to", "4", "--speed", "10")
     assert invoke("animate", tmp_path / "one.nc", *stretch).exit_code == 0
     assert {*clips} == {(tmp_path / "one.gif").read_bytes()}
-    refused(invoke("animate", tmp_path / "one.nc", "--at", "mu=60"), "--at: not for a dataset; give the configuration")
+    refused(
+        invoke("animate", tmp_path / "one.nc", "--at", "mu=60"),
+        "--at: cannot be used with a dataset; give the configuration",
+    )
 
 
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
