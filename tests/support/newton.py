@@ -145,7 +145,8 @@ def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol
     By the matrix that turns the body and by its centre of mass: no angle is integrated, and no contact point.
     """
     n, (u, _) = len(y), _attitude(y, law)
-    across = _unit(cross(cross(u, [0, 1.0, 0]), u))
+    own = _turn(axes(p) if "Ixx" in p else 0.0)  # rows: the axes of which the angles are
+    across = _unit(cross(cross(u, own[1]), u))
     first = np.array([cross(u, across), -across, u])  # rows: X, Y and Z in the body's components
 
     def slopes(_: float, z: Vector) -> Vector:
@@ -160,7 +161,7 @@ def pose(y: Vector, p: Mapping[str, float], law: str | None, times: Vector, rtol
         turn = z[n:-3].reshape(3, 3)
         place = z[-3:] + turn @ contact(_attitude(z[:n], law)[0], p)
         assert abs(place[2]) < 100 * rtol
-        turn = turn @ _turn(axes(p) if "Ixx" in p else 0.0).T
+        turn = turn @ own.T
         y_axis = turn[:, 1]
         found.append(
             [np.arctan2(y_axis[0], -y_axis[1]), -np.arcsin(y_axis[2]), np.arctan2(turn[2, 0], -turn[2, 2]), *place[:2]]

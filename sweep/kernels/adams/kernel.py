@@ -217,7 +217,7 @@ def accurate_step(model: Model, columns: Columns, motion: Array, decay: Array, t
     """
     form = form_of(model)
     reach, at_rest = linear.fastest_spin(form.full, columns) * form.time_unit(columns), form.rest_decay(columns)
-    rise = np.divide(decay, at_rest, out=np.ones_like(decay), where=at_rest > 0) - 1
+    rise = np.divide(decay, at_rest, out=np.full_like(decay, 2.0), where=at_rest > 0) - 1  # 2 without friction
     phase = (tolerance / np.maximum(rise * reach, tolerance)) ** (1 / _POWER)
     return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
 

@@ -131,7 +131,7 @@ def _form_of(scene: Variant) -> StiffForm:
         rocking=scene.inline(record, rigid_body.rocking_on(surface)),
         unit=scene.inline(record, unit),
         time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
-        slip_decay=lambda columns: 1.5 * columns["mu"] * grip_at_rest(columns) + 2.2 * rigid_body.spin_unit(columns),
+        slip_decay=lambda columns: 2.2 * (columns["mu"] * grip_at_rest(columns) + rigid_body.spin_unit(columns)),
         rest_decay=lambda columns: columns["mu"] * grip_at_rest(columns),
         damping=lambda columns: couples_decay(couples, columns, surface),
     )
