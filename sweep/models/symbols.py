@@ -1,7 +1,7 @@
 """Specialises the equations for a scene: what is zero or one there leaves no instruction.
 
-Functions of a model consist of plain arithmetic without branches (`sweep.models.model.Model`).  Called once with symbols
-in place of numbers, they write down what they compute, and numbers that are known fold away: 0·x, 1·x, x + 0.
+Functions of a model consist of plain arithmetic without branches (`sweep.models.model.Model`).  Called once with
+symbols in place of numbers, they write down what they compute, and numbers that are known fold away: 0·x, 1·x, x + 0.
 What is left becomes the source of one function.  A compiler of floating-point code cannot do that by itself, because
 0·x is not zero for an infinite x.
 """
