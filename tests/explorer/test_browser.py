@@ -564,6 +564,7 @@ def test_a_click_shows_its_curves_without_scrolling(visit: Open, width: int) -> 
 
 
 def test_the_tooltip_of_a_dark_page_is_dark(page: Page) -> None:
+    page.evaluate("localStorage.removeItem('theme')")  # what another test may have chosen
     page.emulate_media(color_scheme="dark")
     page.wait_for_function("document.documentElement.dataset.theme === 'dark'")
     (x, y), tip = place(page, 1, 1), page.locator(".bk-Tooltip").first
