@@ -125,12 +125,12 @@ def scales(config: Config) -> dict[str, float]:
 
 
 def content(figure: Figure) -> list[Any]:
-    """What a figure draws, wherever: the numbers of each panel, with its title."""
+    """What a figure draws, wherever: the numbers of each panel with its title, without the headings of columns."""
     found = []
     for axes in figure.axes:
         maps = [np.ma.filled(np.ma.asarray(mesh.get_array(), float), np.nan).tobytes() for mesh in _meshes(axes)]
         curves = sorted(np.asarray(line.get_xydata(), float).tobytes() for line in axes.lines)
-        found.append((axes.get_title(), maps, curves))
+        found.append((axes.get_title().rpartition("\n")[2], maps, curves))
     return sorted(found)
 
 
