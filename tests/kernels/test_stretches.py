@@ -7,11 +7,13 @@ import pytest
 from support import adaptive, columns
 from support.kernels import finish, images, kernel
 
+import sweep
 from sweep.kernels.adams import stretches
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
+from sweep.models import find
 from sweep.models.ladder import slip
-from sweep.models.model import stack, take
+from sweep.models.model import MODES, stack, take
 from sweep.models.stiff.modes import RATTLE, Rattle, bending
 from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear, stability
@@ -69,6 +71,24 @@ def test_modes_move_as_the_full_model() -> None:
     turned = rattle.turned(rattle.amplitudes)
     assert abs(turned[2] - turned[0]) > 1e-12
     np.testing.assert_allclose(exact[4] - exact[4, 0], turned - turned[0], rtol=1e-4, atol=3e-15)
+
+
+@pytest.mark.parametrize("c", [1.0, 1.7])
+def test_the_power_of_friction_after_a_leap_is_that_of_the_full_model(c: float) -> None:
+    table = images(ADAMS, 0.05, 90_000.0, mu=60.0, a=10.0 * c, b=3.0 * c, c=c, x0=1e-7, y0=1e-7)
+    rattle = Rattle.of(PAPER_FORM, *ADAMS.unpack(table))
+    stretches.move(ADAMS, table, rattle, np.full(1, 10.0 * BLOCK), np.zeros((1, 2)))
+    _, (_, power, _, _) = slip.MODEL.rhs(ADAMS.model_states(table), ADAMS.unpack(table)[1])
+    np.testing.assert_allclose(table[:, row("power0")], power, rtol=1e-3)
+
+
+def test_a_couple_slows_the_spin_of_a_body_that_hardly_rattles() -> None:
+    """As an exponential of time, without leaps at a constant spin."""
+    friction = {"mu": 60, "sigma": 1e-4}
+    scene = {"body": {"b": 3.0}, "friction": friction, "start": {"n0": 0.002, "x0": 1e-9, "y0": 1e-9}}
+    found = sweep.run(scene, method="adams", t_end=20_000, stop_when_settled=False)
+    assert float(found.spin_final) == pytest.approx(0.002 * np.exp(-1e-4 * 20_000 / ((10**2 + 3**2) / 5)), rel=1e-9)
+    assert MODES not in find("slip+viscous+sigma").offers
 
 
 def test_energies_of_the_modes_add_up() -> None:

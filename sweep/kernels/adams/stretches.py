@@ -312,8 +312,10 @@ def _move_history(table: Table, rattle: Rattle, factors: Array) -> None:
 
 
 def _move_powers(form: StiffForm, table: Table, constants: Any) -> None:
-    """Set the power of friction and couples at the last points, for upright spin and a normal force as at rest."""
-    geometry = form.slow(*table.columns(STATES).T, constants)[1]
+    """Set the power of friction at the last points, with the attitude and the normal force of the last state."""
+    y = table.columns(STATES).T
+    _, geometry = form.slow(*y, constants)
+    _, _, numerator, denominator = form.newton(*y[[0, 1, 5, 6]], geometry, 0.0, 0.0, 0.0, constants)
     for j, name in enumerate(POWERS):
         v1, v2 = (table[slip.format((-1 - j) % HISTORY)] for slip in SLIPS)
-        table[name] = form.power(form.unit(constants) ** 2, v1, v2, geometry, constants)
+        table[name] = form.power(numerator / denominator, v1, v2, geometry, constants)

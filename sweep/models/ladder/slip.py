@@ -115,7 +115,8 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         }
 
     linear = law.linear_to is None
-    modes = law == PAPER_LAW and all(couple.linear for couple in couples) and not variant.skew
+    # A couple slows the spin of a body that does not rattle, which neither leaps nor the slow equations allow for.
+    modes = law == PAPER_LAW and not couples and not variant.skew
     return Model(
         **of_any_body(variant),
         summary="full equations with slip friction (Takano 2011, Ldot … visf)",
