@@ -43,7 +43,7 @@ STEP, BLOCKS, ROUNDS = 0.005, 300, 15  # a step that is stable with every law
 def run_of(method: str, name: str) -> Callable[[], float]:
     """A function that returns the nanoseconds of a step and lane."""
     model = find(name)
-    law = {} if model.variant.law in (None, slip.PAPER_LAW) else FRICTION
+    law = {} if model.variant.law in (None, slip.VISCOUS) else FRICTION
     body = BODY | law | (BOWL if name.endswith("paraboloid") else {})
     columns = {each: np.full(LANES, value) for each, value in body.items()}
     measure = [each for each in default(find("slip")) if each not in ("noise_limited", "resting_spin")]

@@ -20,7 +20,7 @@ from sweep.models.symbols import Constants, specialised
 SOLID = "solid"
 """Stands in place of the law in the names of variants without slip."""
 
-PAPER_LAW = LAWS["viscous"]
+VISCOUS = LAWS["viscous"]
 
 EXTRAS: dict[str, dict[str, float]] = {
     "offset": {"offset": 0.0},
@@ -48,7 +48,7 @@ class Variant:
         base, law = ("slip", self.law.name) if self.law else ("noslip", SOLID)
         more = [couple.name for couple in self.couples] + [name for name in EXTRAS if name in self.extras]
         more += [self.surface.name] if self.surface != ELLIPSOID else []
-        return "+".join([base, law, *more] if more or law not in (PAPER_LAW.name, SOLID) else [base])
+        return "+".join([base, law, *more] if more or law not in (VISCOUS.name, SOLID) else [base])
 
     @property
     def skew(self) -> bool:

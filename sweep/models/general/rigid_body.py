@@ -77,7 +77,7 @@ def about_surface(columns: Columns) -> tuple[Array, ...]:
 
 
 def axes(columns: Columns) -> Array:
-    """α, shape (cells,): at most a right angle's half to either side where moments of inertia are given."""
+    """α, shape (cells,): at most 45 degrees to either side where moments of inertia are given."""
     if MOMENTS[0] not in columns:
         return columns["delta"]
     J11, J22, _, J12, _, _ = about_surface(columns)
@@ -95,10 +95,11 @@ def inertia(columns: Columns) -> tuple[Array, ...]:
     J11, J22, J33, J12, J13, J23 = about_surface(columns)
     if MOMENTS[0] not in columns:
         return *homogeneous(columns), J13, J23
-    cos, sin = np.cos(axes(columns)), np.sin(axes(columns))
+    angle = axes(columns)
+    cos, sin = np.cos(angle), np.sin(angle)
     mixed = 2 * J12 * sin * cos
     about_x, about_y = J11 * cos**2 + mixed + J22 * sin**2, J11 * sin**2 - mixed + J22 * cos**2
-    return about_x, about_y, J33, *turned(J13, J23, axes(columns))
+    return about_x, about_y, J33, *turned(J13, J23, angle)
 
 
 def inverse(J: tuple[Array, ...]) -> tuple[Array, ...]:

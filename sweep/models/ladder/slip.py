@@ -32,7 +32,7 @@ import numpy as np
 from sweep.models import attitude
 from sweep.models.general import ripple, starts
 from sweep.models.general.bounds import couples_decay, faint_energy, hardest_turn, strongest_grip
-from sweep.models.general.common import PAPER_LAW, Variant, of_any_body, offers
+from sweep.models.general.common import VISCOUS, Variant, of_any_body, offers
 from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.laws import Law
 from sweep.models.general.rigid_body import about_centre, contact_on, energy_on, gyroscopic
@@ -116,14 +116,14 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
 
     linear = law.linear_to is None
     # A couple slows the spin of a body that does not rattle, which neither leaps nor the slow equations allow for.
-    modes = law == PAPER_LAW and not couples and not variant.skew
+    modes = law == VISCOUS and not couples and not variant.skew
     return Model(
         **of_any_body(variant),
         summary="full equations with slip friction (Takano 2011, Ldot … visf)",
         states=STATES,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=law.coupled is None)
-        | ({REVERSAL_TIME} if law == PAPER_LAW else set())
+        | ({REVERSAL_TIME} if law == VISCOUS else set())
         | ({MODES} if modes else set()),
         constants=record,
         start=lambda columns: starts.slipping(columns, surface),
@@ -149,7 +149,7 @@ def _with_and_without(law: Law):
     return extremes
 
 
-_PAPER = slipping(Variant(PAPER_LAW), ())
+_PAPER = slipping(Variant(VISCOUS), ())
 
 MODEL = replace(
     _PAPER,

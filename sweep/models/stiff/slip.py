@@ -26,11 +26,11 @@ import numpy as np
 
 from sweep.models.general import rigid_body, ripple
 from sweep.models.general.bounds import couples_decay, grip_at_rest
-from sweep.models.general.common import PAPER_LAW, Variant
+from sweep.models.general.common import VISCOUS, Variant
 from sweep.models.general.couples import damping_of
 from sweep.models.general.rigid_body import about_centre, about_contact, gyroscopic
 from sweep.models.ladder.slip import slipping
-from sweep.models.model import Model
+from sweep.models.model import Array, Columns, Model
 from sweep.models.stiff.form import Geometry, StiffForm, in_momentum
 from sweep.models.vectors import Symmetric, Vector
 
@@ -43,7 +43,7 @@ def has_form(model: Model) -> bool:
     that dopri5's steps are short enough for.
     """
     of = model.variant
-    if model.origin or of is None or of.law != PAPER_LAW:
+    if model.origin or of is None or of.law != VISCOUS:
         return False
     return not any(couple.needs_normal_force for couple in of.couples)
 
@@ -113,6 +113,9 @@ def _form_of(scene: Variant) -> StiffForm:
         v = Vector(v1, v2, -(v1 * geometry.t1 + v2 * geometry.t2))
         return p.mu * R * v.dot(v) + damping(Vector(geometry.w1, geometry.w2, geometry.w3), p)[1]
 
+    def rest_decay(columns: Columns) -> Array:
+        return np.asarray(columns["mu"] * grip_at_rest(columns))
+
     def unit(p):
         return np.sqrt(p.g / surface.stiffness(p)[3])
 
@@ -131,8 +134,8 @@ def _form_of(scene: Variant) -> StiffForm:
         rocking=scene.inline(record, rigid_body.rocking_on(surface)),
         unit=scene.inline(record, unit),
         time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
-        slip_decay=lambda columns: 2.2 * (columns["mu"] * grip_at_rest(columns) + rigid_body.spin_unit(columns)),
-        rest_decay=lambda columns: columns["mu"] * grip_at_rest(columns),
+        slip_decay=lambda columns: 2.2 * (rest_decay(columns) + rigid_body.spin_unit(columns)),
+        rest_decay=rest_decay,
         damping=lambda columns: couples_decay(couples, columns, surface),
     )
 
