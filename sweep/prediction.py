@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.ladder import analytic
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
-from sweep.models.theory import stability
+from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
 
 # Bodies whose eigenvalues are found at once (about 60 MB); a body takes 0.1 ms.
@@ -64,14 +64,36 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
     return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}
 
 
+def decay_times(model: Model, grid: Grid) -> Array:
+    """Return the time in which the slowest rattle at rest falls by e, in the model's units, shape (cells,).
+
+    Zero where it does not decay, where a body cannot be, and for a model without a linear theory.
+    """
+
+    def times(columns: Columns) -> Array:
+        constants = model.constants.of(columns)
+        growth = linear.growth_rate(model, constants, np.zeros_like(constants[0]))
+        return np.divide(-1.0, growth, out=np.zeros((1, len(growth))), where=growth < stability.DECAYS)
+
+    bodies, place = grid.bodies()
+    if LINEAR not in model.offers:
+        return np.zeros(len(place))
+    return np.asarray(np.nan_to_num(_in_parts(times, model, bodies.columns(), 1)[0])[place])
+
+
 def _stable_ranges(model: Model, columns: Columns) -> Array:
     """Ranges of spin in which the rattle of bodies decays, shape (6, bodies); NaN for bodies that cannot be."""
+    return _in_parts(lambda some: stability.stable_ranges(model, some), model, columns, 6)
+
+
+def _in_parts(of: Callable[[Columns], Array], model: Model, columns: Columns, rows: int) -> Array:
+    """Evaluate a function of bodies, some at a time, shape (rows, bodies); NaN for those that cannot be."""
     gone = model.impossible(columns)
-    ranges, possible = np.full((6, len(gone)), np.nan), np.flatnonzero(~gone)
+    found, possible = np.full((rows, len(gone)), np.nan), np.flatnonzero(~gone)
     for begin in range(0, len(possible), _PART):
         some = possible[begin : begin + _PART]
-        ranges[:, some] = stability.stable_ranges(model, {name: values[some] for name, values in columns.items()})
-    return ranges
+        found[:, some] = of({name: values[some] for name, values in columns.items()})
+    return found
 
 
 def formulas(tier: Tier, grid: Grid) -> dict[str, Array]:

@@ -28,7 +28,7 @@ from sweep.engine import ending
 from sweep.engine.cells import Cells
 from sweep.engine.failures import MOST_STEPS
 from sweep.engine.lives import COMPANION, ERRORS, Lives
-from sweep.engine.plan import Plan
+from sweep.engine.plan import TOLERANCE_TIME, Plan
 from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES
 from sweep.kernels.method import MISSED, REPEAT
@@ -45,9 +45,6 @@ AIM = 0.5
 SHORTEST = 8.0
 """Largest factor by which a repeat shortens the step. An error that needs more is treated as one that the motion
 amplifies without bound."""
-
-TOLERANCE_TIME = 400.0
-"""The time in sqrt(c/g) to which a tolerance refers; the permitted error of a longer run grows in proportion."""
 
 ROUND_OFF = 1e-13
 """An error in spin that no shorter step reduces, in sqrt(g/c)."""

@@ -19,8 +19,16 @@ from sweep.kernels.method import FIXED
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.models.model import Columns
-from sweep.prediction import Prediction, predict
+from sweep.models.theory.linear import fastest_spin
+from sweep.prediction import Prediction, decay_times, predict
 from sweep.results import dataset
+
+TOLERANCE_TIME = 400.0
+"""The time in sqrt(c/g) to which a tolerance refers; the permitted error of a longer run grows in proportion."""
+
+_DECAY_TIMES, _SLOW, _LOOSEST = 2.0, 1.5, 8.0
+"""How long a slow run lasts at least, in times in which its rattle decays; the angle by which it may turn in a period
+of its rattle, if all its energy goes into the spin; and how many times the tolerance is taken at most."""
 
 # Each kernel is made once in a process, because its machine code takes a second to load.
 _kernel = cache(methods.make_kernel)
@@ -95,17 +103,18 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
 
     If there are no such cells, there is one choice with no cells.
     """
-    model, integrator = config.equations, config.integrator
+    model, method = config.equations, config.integrator.method
     each = [grid.columns() for grid in grids]
     columns = {name: np.concatenate([some[name] for some in each]) for name in each[0]}
     possible = np.flatnonzero(~model.impossible(columns))
     columns = {name: values[possible] for name, values in columns.items()}
     if not len(possible):
         return (_cells(kernels(config)[0], config, possible, columns, np.empty(0), np.empty(0)),)
-    if integrator.method == AUTO:
-        chosen, steps, rules = methods.cheapest(model, columns, integrator.tolerance, integrator.t_end)
+    tolerance = np.concatenate([first_tolerance(config, grid) for grid in grids])[possible]
+    if method == AUTO:
+        chosen, steps, rules = methods.cheapest(model, columns, tolerance, config.integrator.t_end)
     else:
-        chosen, (steps, rules) = np.full(len(possible), integrator.method), steps_of(integrator.method, config, columns)
+        chosen, (steps, rules) = np.full(len(possible), method), steps_of(method, config, columns, tolerance)
     choices = []
     for method in METHODS:
         if len(cells := np.flatnonzero(chosen == method)):
@@ -125,9 +134,30 @@ def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step:
     return Cells(kernel, config.equations, rules, cells, columns, step, step_rule, *blank)
 
 
-def steps_of(method: str, config: Config, columns: Columns) -> tuple[Array, Array]:
-    """Return the step of each cell with a method, configured or automatic, and what set it; both of shape (cells,)."""
+def first_tolerance(config: Config, grid: Grid) -> Array:
+    """Return the tolerance for which the first step of each cell is chosen, shape (cells,).
+
+    It is larger than the tolerance itself where a run will be long, is compared with a companion and is repeated if its
+    error is too large: the permitted error grows with time, and a long run forgets its early errors. With the step for
+    the tolerance itself, half of the cells of `configs/mu_b.yaml` end with less than a hundredth of the permitted error
+    (scripts/LOG.md).  A body that spins fast may soon lift off or topple.
+    """
+    how, model, columns = config.integrator, config.equations, grid.columns()
+    if not (how.estimate_errors and config.repeats and how.step == "auto"):
+        return np.full(grid.size, how.tolerance)
+    with np.errstate(all="ignore"):  # impossible bodies
+        slow = fastest_spin(model, columns) * model.slower_period(columns) < _SLOW
+        least = np.where(slow, _DECAY_TIMES * decay_times(model, grid) * model.spin_unit(columns), 0.0)
+    return np.asarray(how.tolerance * np.clip(least / TOLERANCE_TIME, 1.0, _LOOSEST))
+
+
+def steps_of(method: str, config: Config, columns: Columns, tolerance: Array | None = None) -> tuple[Array, Array]:
+    """Return the step of each cell with a method, configured or automatic, and what set it; both of shape (cells,).
+
+    `tolerance`, of shape (cells,), is that of the configuration by default.
+    """
     step, cells = config.integrator.step, len(next(iter(columns.values())))
     if step == "auto":
-        return methods.automatic_step(method, config.equations, columns, config.integrator.tolerance)
+        tolerance = np.full(cells, config.integrator.tolerance) if tolerance is None else tolerance
+        return methods.automatic_step(method, config.equations, columns, tolerance)
     return np.full(cells, step), np.full(cells, FIXED)

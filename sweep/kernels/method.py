@@ -33,6 +33,9 @@ from sweep.models.model import Array, Columns, Model
 TOLERANCE = 1e-8
 """Default tolerance: the error in spin at t = 400, in sqrt(g/c)."""
 
+Tolerance = float | Array
+"""One for all cells, or one for each, shape (cells,)."""
+
 FIXED, ACCURACY, STABILITY, REPEAT, MISSED = range(5)
 STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability", REPEAT: "repeat", MISSED: "missed"}
 """Names of what determined a step: the configuration, the tolerance, the stability limit of the method, that a longer
@@ -51,7 +54,7 @@ class Method:
     """One line for the documentation."""
     stepper: Callable[[Model, float], Stepper]
     """(model, tolerance) -> what takes its steps."""
-    accurate_step: Callable[[Model, Columns, Array, Array, float], Array]
+    accurate_step: Callable[[Model, Columns, Array, Array, Tolerance], Array]
     """(model, columns, motion, decay, tolerance) -> the step that keeps the error in spin at t = 400 within the
     tolerance, shape (cells,), in sqrt(c/g), where `motion` is the `fastest_motion` and `decay` the `fastest_decay`."""
     stable_step: Callable[[Array], Array] | None = None

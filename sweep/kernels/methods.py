@@ -9,7 +9,7 @@ import numpy as np
 from sweep.kernels import measures, runge_kutta
 from sweep.kernels.adams import kernel as adams
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method
+from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method, Tolerance
 from sweep.kernels.tableau import TABLEAUS
 from sweep.models.model import Array, Columns, Model
 from sweep.models.theory.linear import fastest_motion
@@ -28,7 +28,7 @@ def allowed(model: Model) -> tuple[str, ...]:
     return tuple(name for name, method in METHODS.items() if method.runs(model))
 
 
-def cheapest(model: Model, columns: Columns, tolerance: float, t_end: float) -> tuple[Array, Array, Array]:
+def cheapest(model: Model, columns: Columns, tolerance: Tolerance, t_end: float) -> tuple[Array, Array, Array]:
     """Choose the method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
 
     Returns the names of the methods, and step and rule as `automatic_step` gives them, each of shape (cells,).
@@ -48,14 +48,16 @@ def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: fl
     return Kernel(METHODS[method].stepper(model, tolerance), measures.with_decay(measures.chosen(measure), model))
 
 
-def automatic_step(method: str, model: Model, columns: Columns, tolerance: float = TOLERANCE) -> tuple[Array, Array]:
+def automatic_step(
+    method: str, model: Model, columns: Columns, tolerance: Tolerance = TOLERANCE
+) -> tuple[Array, Array]:
     """Step of each trajectory, in sqrt(c/g), and the rule that determined it; both of shape (cells,)."""
     rates = fastest_motion(model, columns), model.fastest_decay(columns)
     return _step(METHODS[method], model, columns, *rates, tolerance)
 
 
 def _step(
-    method: Method, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float
+    method: Method, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance
 ) -> tuple[Array, Array]:
     with np.errstate(divide="ignore"):
         accurate = method.accurate_step(model, columns, motion, decay, tolerance)

@@ -18,7 +18,7 @@ from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, PACK
 from sweep.kernels.measures.measurement import TANGENT
-from sweep.kernels.method import TOLERANCE, Method
+from sweep.kernels.method import TOLERANCE, Method, Tolerance
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.generated import compile_inline, tuple_of
@@ -142,7 +142,7 @@ def method(tableau: Tableau) -> Method:
 
 
 def _accurate_step(
-    tableau: Tableau, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float
+    tableau: Tableau, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance
 ) -> Array:
     power = 1 / tableau.order
     step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion

@@ -15,7 +15,7 @@ from sweep.config import load_config
 from sweep.engine import errors
 from sweep.engine.executor import execute
 from sweep.engine.life import begin, live
-from sweep.engine.plan import kernel_of, plan, steps_of
+from sweep.engine.plan import first_tolerance, kernel_of, plan, steps_of
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT
@@ -56,7 +56,7 @@ def test_estimates_are_near_true_errors(method: str, steps: list[float]) -> None
 
 def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured."""
-    lengthen(monkeypatch, 4)
+    lengthen(monkeypatch, 3)
     for measure in (default_measures("slip"), ["reversals", "margin"]):
         repeated = cells([BODY], method="adams", measure=measure)
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
@@ -173,3 +173,13 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
     assert sound.mean() > 0.9
     assert 0.3 < np.median(ratio) < np.quantile(ratio, 0.9) < 3
     assert (ratio > 10).sum() <= 1
+
+
+def test_a_long_run_begins_with_longer_steps_only_where_its_error_is_checked() -> None:
+    """A body that spins fast may lift off soon."""
+    scene = {"friction": {"mu": 100}, "integrator": {"method": "adams"}}
+    long = sweep.load_config(scene, {"n0": [0.05, 5.0]})
+    unchecked = sweep.load_config(scene, {"n0": [0.05, 5.0], "estimate_errors": False})
+    np.testing.assert_allclose(first_tolerance(long, long.grid)[1], 1e-8, rtol=1e-12)
+    assert 2e-8 < first_tolerance(long, long.grid)[0] < 8e-8
+    np.testing.assert_array_equal(first_tolerance(unchecked, unchecked.grid), 1e-8)

@@ -57,7 +57,7 @@ def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> Non
     words = describe(edge)
     assert "8 impossible" in words
     assert "2 cells, upright rest is not stable" in words
-    assert "set by accuracy in 10 cells" in "".join(accuracy(edge))
+    assert "set by accuracy in 9 cells, repeat in 1 cell" in "".join(accuracy(edge))
 
 
 def test_neighbours_do_not_notice(edge: xr.Dataset, write: Write) -> None:

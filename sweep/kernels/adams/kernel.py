@@ -40,7 +40,7 @@ from sweep.kernels.adams.step import (
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, PACK, Table
 from sweep.kernels.measures.measurement import WORK, Stretch
-from sweep.kernels.method import Method
+from sweep.kernels.method import Method, Tolerance
 from sweep.kernels.status import DIVERGED, RUNNING
 from sweep.models.generated import compile_inline
 from sweep.models.model import MODES, Array, Columns, Model, stack
@@ -208,7 +208,7 @@ _POWER = 6
 _LONGEST_PHASE = 0.4
 
 
-def accurate_step(model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float) -> Array:
+def accurate_step(model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance) -> Array:
     """Step at which the error in spin at t = 400 sqrt(c/g) is about `tolerance`, in the model's units, shape (cells,).
 
     Parameters

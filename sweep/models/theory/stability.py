@@ -28,7 +28,7 @@ SPIN_LIMIT = 10.0
 taken to be stable at any spin."""
 
 # Without friction the growth rates are zero except for rounding.
-_DECAYS = -1e-13
+DECAYS = -1e-13
 
 
 def critical_spins(model: Model, columns: Columns) -> tuple[Array, Array]:
@@ -65,7 +65,7 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     rest = np.zeros_like(constants[0])
     ranges = np.full((6, len(rest)), np.nan)
     steady = _is_steady(model, constants, model.spin_unit(columns))
-    cells = np.flatnonzero((growth_rate(model, constants, rest) < _DECAYS) & steady)
+    cells = np.flatnonzero((growth_rate(model, constants, rest) < DECAYS) & steady)
     if len(cells):
         constants = take(constants, cells)
         changes = _possible_changes(*_polynomial(model, constants))
