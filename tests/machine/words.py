@@ -31,7 +31,7 @@ SLOW = ("fit", "animate")
 AXES = ("mu", "b", "n0", "c")
 
 TEXTS: dict[str | None, tuple[str, ...]] = {
-    "NAME=VALUE": tuple(f"{name}={value}" for name in (*AXES, *PARAMETERS) for value in (60, 3, 0.05, 0, -1)),
+    "NAME=VALUE": tuple(f"{name}={value}" for name in (*AXES, *PARAMETERS) for value in (60, 3, 0.05, 0, -1, "2deg")),
     "LOW..HIGH": ("0..5", "-1..1", "0..1e7", "5..1", "1e-9..2e-9", "0..0.5"),
     "LENGTH": ("85mm", "50mm", "3in", "17 cm", "2mm", "1"),
     "NUMBER[+-ERROR]UNIT": ("12.0+-0.1cm", "30g", "1.24g/cm3", "2deg", "5mm", "1 in", "x"),
@@ -76,7 +76,10 @@ def option(verb: str, name: str, number: int) -> list[str]:
         values = [f"{path}={json.dumps(setting(path, number))}"]
     else:
         values = TEXTS.get(found.metavar, random.choice([*TEXTS.values()]))
-    return [found.opts[0], str(random.choice(values))]
+    first = str(random.choice(values))
+    both = [value for value in map(str, values) if value.partition("=")[0] == first.partition("=")[0]]
+    twice = [found.opts[0], random.choice(both)] if getattr(found, "multiple", False) and number % 2 else []
+    return [found.opts[0], first, *twice]
 
 
 def arguments(function: str, drawn: Draws) -> dict[str, Any]:
