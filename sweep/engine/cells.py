@@ -46,7 +46,7 @@ class Cells:
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
     stable: Array
-    """Ranges of spin in which the rattle decays, as `Kernel.images` takes them, shape (6, cells)."""
+    """Ranges of spin in which the rattle decays, as `Kernel.images` takes them, shape (7, cells)."""
     images: Array
     """Shape (cells, rows)."""
 

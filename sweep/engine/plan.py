@@ -130,7 +130,7 @@ def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step:
         how.t_end, how.tolerance, how.patience, how.stop_when_settled, fixed, how.estimate_errors,
         config.repeats and not fixed,
     )  # fmt: skip
-    blank = np.full((6, len(cells)), np.nan), np.empty((0, 0))
+    blank = np.full((7, len(cells)), np.nan), np.empty((0, 0))
     return Cells(kernel, config.equations, rules, cells, columns, step, step_rule, *blank)
 
 

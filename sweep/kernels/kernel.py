@@ -155,7 +155,7 @@ class Kernel:
         step : the longest step wanted, in sqrt(c/g), shape (cells,)
         t_end : time limit in sqrt(c/g), a number or of shape (cells,)
         stable : lower and upper ends of the ranges of spin in which the rattle decays: about zero, the
-            next range below, and the next above; shape (6, cells).  NaN where there is no such range;
+            next range below, and the next above, and the share in `STABLE`; shape (7, cells).  NaN where there is none;
             by default there is none anywhere
         """
         return self.stepper.images(self, columns, step, t_end, stable)

@@ -25,8 +25,9 @@ PACK = 1 if INTERPRETED else 8
 BLOCK = 128
 
 
-STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to")
-"""Ends of the ranges of spin in which the rattle decays: the range about zero, and the next below and above it."""
+STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to", "stable_share")
+"""Ends of the ranges of spin in which the rattle decays: the range about zero, and the next below and above it; and the
+share of the first in which the rattle decays faster than a couple slows the spin."""
 
 # A spin beyond n_c1 by less than this factor can reverse no more, although the rattle grows there.
 BEYOND = 1.5

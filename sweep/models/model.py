@@ -203,6 +203,11 @@ class Model(Tier):
     """Where the model comes from, if a user brings it."""
 
     @property
+    def slows(self) -> bool:
+        """Whether a couple may slow the spin: of a model that a user brings, nobody knows."""
+        return bool(self.variant.couples) if self.variant else bool(self.origin)
+
+    @property
     def key(self) -> str:
         """Name its compiled code, apart from that of other models."""
         return f"{self.name}@{self.origin.digest}" if self.origin else self.name

@@ -111,3 +111,35 @@ def test_settled_trajectories_stay_where_they_are_said_to() -> None:
     assert (np.abs(rest / end - 1) < np.where(grows, 4e-3, 1e-3))[settled].all()
     assert np.abs(left.spin_final.values / end - 1)[settled].max() > 0.01
     assert np.isnan(rest[~settled]).all()
+
+
+def test_what_is_left_of_a_rattle_may_turn_a_spin_that_a_couple_slows() -> None:
+    """It settled at t = 26, and its spin reverses at t = 2175.  A weak couple does not keep a cell from settling."""
+    body = {"a": 2.34302, "b": 1.04662, "delta": -0.01263}
+    scene = {"body": body, "friction": {"mu": 750.3, "sigma": 0.01134}, "start": {"x0": 0.02637, "y0": 0.01432}}
+    swept, whole = (sweep.run(scene, n0=-0.06944, t_end=3000.0, stop_when_settled=ends) for ends in (True, False))
+    assert (int(swept.reversals), int(whole.reversals), int(swept.decided)) == (1, 1, 0)
+    weak = sweep.run({"friction": {"mu": 60, "sigma": 1e-4}, "start": {"n0": 0.02}})
+    assert (int(weak.status), int(weak.decided)) == (SETTLED, 1)
+
+
+@pytest.mark.campaign
+def test_no_count_of_a_body_that_a_couple_slows_is_decided_too_early() -> None:
+    random = np.random.default_rng(20261127)
+    size = 150
+
+    def log(low: float, high: float) -> np.ndarray:
+        return np.exp(random.uniform(np.log(low), np.log(high), size))
+
+    a, signs = log(2, 15), random.choice([-1, 1], size)
+    cells = {
+        "a": a, "b": 1 + (a - 1) * random.uniform(0.02, 0.98, size), "c": np.ones(size),
+        "delta": signs * log(0.005, 0.3), "sigma": log(1e-4, 3), "mu": log(50, 5000),
+        "n0": random.uniform(-0.15, 0.15, size), "x0": random.uniform(-0.03, 0.03, size),
+        "y0": random.uniform(-0.03, 0.03, size),
+    }  # fmt: skip
+    scene = {"cases": {name: values.tolist() for name, values in cells.items()}, "integrator": {"t_end": 10_000.0}}
+    swept, whole = sweep.run(scene), sweep.run(scene, stop_when_settled=False)
+    decided = swept.decided == 1
+    assert int(decided.sum()) > 40
+    assert (swept.reversals == whole.reversals).values[decided].all()

@@ -123,7 +123,7 @@ def _make_stays(layout: Layout):
 
     That is a stable range, or below `BEYOND` times n_c1 (`sweep.kernels.lanes`).
     """
-    FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO = map(layout.at, STABLE)
+    FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO = map(layout.at, STABLE[:6])
 
     @inline
     def stays(group, lane, lowest, highest):

@@ -27,6 +27,12 @@ SPIN_LIMIT = 10.0
 """Largest |spin| examined, in sqrt(g/c), fifty times what a hand gives: upright spin that is stable up to here is
 taken to be stable at any spin."""
 
+_SLOW_SPIN = 1e-8
+"""A spin at which couples are as at rest, in sqrt(g/c)."""
+
+_MARGIN = 1.5
+"""Safety factor on the decay rate of the spin: growth rates are not quite linear in it."""
+
 # Without friction the growth rates are zero except for rounding.
 DECAYS = -1e-13
 
@@ -74,6 +80,27 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
             for row, end in zip(rows, ends, strict=True):
                 ranges[row, cells] = sign * end
     return ranges
+
+
+def share_within(model: Model, columns: Columns) -> Array:
+    """Return within which share of the range about zero the rattle decays faster than a couple slows the spin.
+
+    By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 changes as e' = -2 s (n_c - n) e, and the spin as
+    n' = -s e - r n, where r is its decay rate by the couple.  Then q = sqrt(e)/n obeys q'/q = r - s n_c + s n (1 + q²).
+    So sqrt(e) falls for ever faster than n, and cannot turn it, if n (1 + q²) < n_c (1 - r/(s n_c)), where s n_c is the
+    decay rate of the rattle at rest.
+
+    Returns
+    -------
+    Shape (cells,): 1 without a couple; 0 if the spin decays faster at rest than the rattle.
+    """
+    constants, small = model.constants.of(columns), _SLOW_SPIN * model.spin_unit(columns)
+    upright = stack(model.upright(small))[model.spin_state]
+    slowing = -stack(model.rhs(tuple(stack(model.upright(small))), constants)[0])[model.spin_state] / upright
+    decay = -growth_rate(model, constants, np.zeros_like(small))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(slowing > 0, 1 - _MARGIN * slowing / decay, 1.0)
+    return np.asarray(np.where(decay > 0, np.clip(share, 0.0, 1.0), 1.0))
 
 
 def _is_steady(model: Model, constants, spin: Array) -> Array:
