@@ -6,8 +6,8 @@ must be a configuration; a ```{code-block} with a caption is a file.  A block th
 it that says why: <!-- not run: takes minutes -->.  With <!-- campaign: takes a minute --> it is run among the
 campaigns alone.
 
-What a page shows as output is made when the pages are built, by ```{code-cell} and ```{console}.  A page that has
-nothing else is run then alone.
+What a page shows as output is made when the pages are built, by ```{code-cell}, ```{console} and ```{python}.  A page
+that has nothing else is run then alone.
 """
 
 import pkgutil
@@ -79,7 +79,7 @@ def commands(block: Block) -> list[str]:
 
 def _runs(page: Path, *when: str) -> list[Block]:
     """The blocks to run, none if building the pages runs all of them."""
-    kinds = ("console", "{console}", "python", "{code-cell}", "yaml", "{code-block}")
+    kinds = ("console", "{console}", "python", "{python}", "{code-cell}", "yaml", "{code-block}")
     found = [block for block in blocks(page) if block.kind in kinds and block.when in when]
     return found if {block.kind for block in found} & {"console", "python", "yaml"} else []
 

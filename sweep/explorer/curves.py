@@ -11,6 +11,7 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
+from sweep.explorer.page import PARTS
 from sweep.explorer.player import Player
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
@@ -31,6 +32,9 @@ class Curves:
     """The figures of the trajectories, with `MAX_CELLS` curves each."""
 
     def __init__(self) -> None:
+        self._hint = models.Div(text=str(PARTS.empty()), sizing_mode="stretch_width")
+        self.root = models.Column(self._hint, sizing_mode="stretch_width", name="curves")
+        """The hint, or the figures once they have curves: Bokeh warns of a figure without data."""
         self.spin, self.energy = _figure(260, "spin"), _figure(190, "energies")
         self.energy.x_range = self.spin.x_range
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
@@ -54,8 +58,9 @@ class Curves:
         present = [curve.dataset for curve in curves if curve]
         if present:
             self._label(present[0])
-        for part, series in ((self.spin, "spin"), (self.energy, "energy")):
-            part.visible = any(series in one for one in present)
+        parts = {"spin": self.spin, "energy": self.energy}
+        figures = [part for series, part in parts.items() if any(series in one for one in present)]
+        self.root.children = [*figures] or [self._hint]
         end = max([float(one["time"].max()) for one in present], default=1.0)
         chosen = curves[active] if active < len(curves) else None
         if (chosen, end) != self._played:

@@ -193,6 +193,7 @@ def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
     """Make the figure of a cut along an axis, with the data that `cut` of page.js needs to fill it."""
     plot = figure(
         height=_CUT_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
+        y_range=models.Range1d(),  # set with the data: Bokeh warns of a range by data if all of them are missing
         x_axis_type=style.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
         outline_line_color=None,
     )  # fmt: skip

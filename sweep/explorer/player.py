@@ -31,7 +31,7 @@ class Player:
             match_aspect=True, outline_line_color=None,
         )  # fmt: skip
         plot.axis.visible = plot.grid.visible = False
-        self._table = models.ColumnDataSource({"xs": [], "ys": []})
+        self._table = models.ColumnDataSource({"xs": [[0.0]], "ys": [[0.0]]})  # else Bokeh warns of axes without range
         self._motion, self._shape = models.ColumnDataSource(), models.ColumnDataSource()
         faces = models.ColumnDataSource({"xs": [], "ys": [], "colour": []}, syncable=False, name="faces")
         trace = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
@@ -48,7 +48,7 @@ class Player:
             other.add_layout(line)
         parts = {"motion": self._motion, "shape": self._shape, "faces": faces, "trace": trace, "line": line,
                  "clock": clock}  # fmt: skip
-        self.controls = self._controls(parts)
+        self.root = models.Column(plot, self._controls(parts), sizing_mode="stretch_width", name="played")
 
     def _controls(self, parts: dict[str, Any]) -> models.Column:
         button = models.Toggle(label="▶ Play", width=84, syncable=False, name="play")
@@ -73,17 +73,17 @@ class Player:
     def show(self, curve: Curve | None, colour: str, end: float) -> None:
         """Show the body of a curve, if its attitude and shape are known; the slider goes to the time `end`."""
         self._slider.update(end=end, step=end / 2000)
-        self.figure.visible = self.controls.visible = curve is not None and body.drawable(curve.dataset)
-        if not curve or not self.figure.visible:
+        self.root.visible = curve is not None and body.drawable(curve.dataset)
+        if not curve or not self.root.visible:
             self._motion.data = {"time": [], "turn": [], "contact": [], "path": []}
             return
         one = curve.dataset
         self._slider.tags = [labels.unit(one, "time")]
         times = one["time"].values[:: -(-one.sizes["time"] // _MOMENTS)]
         moving = body.moving(one, times)
-        moving.look(_camera())
+        moving.look(_camera(), moving.reach)
         matrix = _camera().get_proj()
-        seen = [proj3d.proj_transform(*line, matrix) for line in moving.table]
+        seen = [proj3d.proj_transform(*line, matrix) for line in moving.table(moving.reach)]
         self._table.data = {"xs": [x for x, *_ in seen], "ys": [y for _, y, _ in seen]}
         self._shape.data = {
             "points": [moving.points], "tones": [moving.colours(colour)], "matrix": [matrix],

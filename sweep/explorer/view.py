@@ -59,13 +59,9 @@ class View:
         self._figures = Curves()
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
-        self._hint = Div(text=str(PARTS.empty()), sizing_mode="stretch_width")
-        shown = self._figures
-        curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
-        player = Column(shown.player.figure, shown.player.controls, sizing_mode="stretch_width", name="played")
-        self._document.js_on_event("document_ready", shown.player.moment)
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, player,
-                     self._chosen.root, self._buttons()):  # fmt: skip
+        self._document.js_on_event("document_ready", self._figures.player.moment)
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, self._figures.root,
+                     self._figures.player.root, self._chosen.root, self._buttons()):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
@@ -185,7 +181,6 @@ class View:
         self._curves = curves
         named = enumerate(zip(self._names(), curves, strict=True), 1)
         names = [f"{k}: {name}{_counted(curve)}" for k, (name, curve) in named]
-        self._hint.visible = not any(curves)
         self._figures.show(curves, names, self._drawn.active)
         self._chosen.show_ends(curves)
 

@@ -105,13 +105,19 @@ class _Scene:
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
         zero_line(over_time)
+        ones = [dataset.isel(trajectory=i) for i in range(bodies)]
+        moving = [body.moving(one, times) for one in ones]
+        half = max(each.reach for each in moving)  # one scale for all
         self.bodies = []
-        for i in range(bodies):
+        for i, (one, each) in enumerate(zip(ones, moving, strict=True)):
             place = (i / bodies, 0.42, 1 / bodies, 0.55)
             axes: Any = self.figure.add_axes(place, projection="3d", computed_zorder=False)
             axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.8)
+            each.look(axes, half)
+            for line in each.table(half):
+                axes.plot(*line, color="0.85", linewidth=0.6, zorder=0)
             (curve,) = over_time.plot([], [], color=f"C{i}", linewidth=1)
-            self.bodies.append(_Body(dataset.isel(trajectory=i), times, axes, curve))
+            self.bodies.append(_Body(one, each, times, axes, curve))
         spins = np.append(np.concatenate([each.spin for each in self.bodies]), 0.0)
         margin = 0.08 * max(np.ptp(spins), 1e-12)
         over_time.set_ylim(spins.min() - margin, spins.max() + margin)
@@ -126,14 +132,10 @@ class _Scene:
 class _Body:
     """One body on its table, and its curve of n(t)."""
 
-    def __init__(self, one: xr.Dataset, times: Array, axes: Any, curve: Line2D) -> None:
-        self.axes, self.curve, self.times = axes, curve, times
-        self.moving = body.moving(one, times)
+    def __init__(self, one: xr.Dataset, moving: body.Moving, times: Array, axes: Any, curve: Line2D) -> None:
+        self.axes, self.curve, self.times, self.moving = axes, curve, times, moving
         known = np.isfinite(one["heading"].values)
         self.spin = np.interp(times, one["time"].values[known], one["spin"].values[known])
-        self.moving.look(axes)
-        for line in self.moving.table:
-            axes.plot(*line, color="0.85", linewidth=0.6, zorder=0)
         # Seen through the body, which covers most of it.
         (self.trace,) = axes.plot([], [], [], color="black", linewidth=1, zorder=3)
         (self.dot,) = axes.plot([], [], [], "o", color="black", markersize=3, zorder=3)
