@@ -20,7 +20,7 @@ from sweep.grid import Array
 from sweep.plots import labels, theory
 
 _STRETCHES = 3000
-"""Stretches of a long curve; only the lowest and the highest sample of each stretch are drawn."""
+"""Number of stretches of a long curve; only the lowest and the highest sample of each are drawn."""
 
 _OVER_TIME = ("spin", "energy", "dissipated")
 

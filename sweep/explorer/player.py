@@ -1,4 +1,4 @@
-"""Plays a trajectory: its body turns on the table in perspective, above the path of its contact point."""
+"""Play a trajectory: its body turns on the table in perspective, above the path of its contact point."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from sweep.explorer.style import GRID, SOFT
 from sweep.plots import body, labels
 
 _MOMENTS = 20_000
-"""Samples sent to the browser, at most."""
+"""Largest number of samples sent to the browser."""
 
 
 class Player:
     """The body of one trajectory, and the controls that play it; everything happens in the browser."""
 
     def __init__(self, over_time: list[Any]) -> None:
-        """`over_time` are the figures in which a line marks the moment."""
+        """Add a line that marks the time to the figures `over_time`."""
         self.figure = plot = figure(
             height=260, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, name="body",
             match_aspect=True, outline_line_color=None,
@@ -60,7 +60,7 @@ class Player:
             ("0.002", "0.2 %"), ("0.02", "2 %"), ("0.2", "20 %"), ("1", "all")])  # fmt: skip
         parts |= {"slider": self._slider, "speed": speed, "button": button, "trail": trail}
         self.moment = moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
-        """Draws the moment of the slider."""
+        """Draws the body at the time of the slider."""
         for model, change in (
             (self._slider, "value"), (self._slider, "end"), (trail, "value"), (self._motion, "data"),
         ):  # fmt: skip

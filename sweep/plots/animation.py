@@ -24,7 +24,7 @@ from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
 MOST = 6
-"""Bodies shown side by side, at most."""
+"""Largest number of bodies shown side by side."""
 
 SECONDS = 10.0
 """Duration of a clip whose speed is not given."""
@@ -32,7 +32,7 @@ SECONDS = 10.0
 FRAMES_A_SECOND = 20
 
 _BEYOND = 2.0
-"""End of a clip, relative to the latest first reversal of its bodies, which so lies in the middle."""
+"""End of a clip, relative to the latest first reversal of its bodies, which is thus in the middle."""
 
 _BUTTONS = {
     "minus": "−", "fast-backward": "⏮", "step-backward": "⏪", "play fa-flip-horizontal": "◀", "pause": "⏸",

@@ -41,7 +41,7 @@ class Moving:
 
     @property
     def reach(self) -> float:
-        """Half the side of a table that has room for the body on its path."""
+        """Half the side of the smallest table with room for the body on its path."""
         return float(0.72 * np.abs(self.points).max() + np.ptp(self.path, axis=1).max() / 2)
 
     @property
@@ -108,7 +108,7 @@ def _points(ellipsoid: bool, columns: dict[str, Array]) -> Array:
         depth = 1 - bowl**2
     if below:
         bowl, depth = np.append(bowl, lid), np.append(depth, 0 * lid)
-    azimuth = np.linspace(2 * np.pi, 0, 33)  # so that the sides that are lit are those outside
+    azimuth = np.linspace(2 * np.pi, 0, 33)  # so that the outer sides are lit
     x, y = a * np.outer(bowl, np.cos(azimuth)), b * np.outer(bowl, np.sin(azimuth))
     return np.stack([x, y, np.broadcast_to(c * depth[:, None] - below, x.shape)])
 

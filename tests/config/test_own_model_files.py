@@ -73,7 +73,7 @@ BROKEN = {
                       "        return cls"),
     "start": after(PENDULUM, 'return columns["angle"], nothing', "return nothing", "start gives 2 values; it has",
                    "def start"),
-    "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "the name 'slip' is no word of letters, digits"),
+    "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "invalid model name 'slip': use letters, digits"),
     "spin_state": after(PENDULUM, "spin_state=1", "spin_state=3", "and spin_state the index of one of them"),
     "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
     "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS' are unknown; choose paper, "),

@@ -91,6 +91,7 @@ def go(browser: Browser, served: str) -> Iterator[Open]:  # noqa: ARG001  whose 
     def opened_at(place: str) -> Page:
         page = context.new_page()
         page.set_default_timeout(TIMEOUT)
+
         def complain(what: object) -> None:
             complaints.append(f"{page.url}: {what}")
 
