@@ -1,9 +1,9 @@
 """Commands, their output and pictures: ```{console} runs its lines that begin with `$ ` while the pages are built.
 
 The commands of a page run one after the other, in a folder of its own that holds the repository's `configs` and films.
-Progress bars are left out.  What a command prints goes to a file if it ends with `> FILE`.  ```{picture} shows an image
-file that an earlier command of the page has written.  ```{python} runs a complete program in the same folder and shows
-the picture that it draws with pyplot.
+Progress bars are left out.  What a command prints goes to a file if it ends with `> FILE`, and a ```{code-block} with a
+caption is a file.  ```{picture} shows an image file that an earlier command of the page has written.  ```{python} runs
+a complete program in the same folder and shows the picture that it draws with pyplot.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 from docutils import nodes
 from docutils.parsers.rst.directives.images import Image
 from sphinx.application import Sphinx
+from sphinx.directives.code import CodeBlock
 from sphinx.util.docutils import SphinxDirective
 
 _CONFIGS, _DATA = (Path(__file__).parents[2] / name for name in ("configs", "data"))
@@ -67,6 +68,13 @@ class _Running(SphinxDirective):
         return folder
 
 
+class File(CodeBlock, _Running):
+    def run(self) -> list[nodes.Node]:
+        if name := self.options.get("caption"):
+            (self._folder() / name).write_text("\n".join([*self.content, ""]), encoding="utf-8")
+        return super().run()
+
+
 class Python(_Running):
     option_spec = Image.option_spec
 
@@ -101,6 +109,7 @@ class Console(_Running):
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
+    app.add_directive("code-block", File, override=True)
     app.add_directive("console", Console)
     app.add_directive("picture", Picture)
     app.add_directive("python", Python)
