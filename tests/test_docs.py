@@ -120,8 +120,11 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def _run_command(block: Block, command: str) -> None:
     words = shlex.split(command, comments=True)
     assert words[:3] == ["python", "-m", "sweep"], f"{block}: {command}: only sweep's own commands are run"
+    words, target = (words[:-2], words[-1]) if words[-2] == ">" else (words, "")
     result = CliRunner().invoke(main, words[3:])
     assert result.exit_code == 0, f"{block}: {command}\n{result.output}"
+    if target:
+        Path(target).write_text(result.stdout, encoding="utf-8")
 
 
 def _check_configuration(block: Block, folder: Path) -> None:

@@ -11,7 +11,6 @@ from bokeh import models
 from bokeh.core.properties import value
 from bokeh.plotting import figure
 
-from sweep.explorer.page import PARTS
 from sweep.explorer.player import Player
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
@@ -31,8 +30,9 @@ _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "backgrou
 class Curves:
     """The figures of the trajectories, with `MAX_CELLS` curves each."""
 
-    def __init__(self) -> None:
-        self._hint = models.Div(text=str(PARTS.empty()), sizing_mode="stretch_width")
+    def __init__(self, hint: str) -> None:
+        """`hint` is the HTML that is shown without curves."""
+        self._hint = models.Div(text=hint, sizing_mode="stretch_width")
         self.root = models.Column(self._hint, sizing_mode="stretch_width", name="curves")
         """The hint, or the figures once they have curves: Bokeh warns of a figure without data."""
         self.spin, self.energy = _figure(260, "spin"), _figure(190, "energies")

@@ -57,8 +57,8 @@ class Source:
     def __init__(self, dataset: xr.Dataset, name: str = "dataset") -> None:
         cells = dataset["status"] if "status" in dataset else next(iter(dataset.data_vars.values()), None)
         dims = () if cells is None else tuple(str(d) for d in cells.dims)
-        found = kind(dataset)
-        what = "no axis" if not dims else found.words if found and not found.explored else ""
+        of_kind = kind(dataset)
+        what = "no axis" if not dims else of_kind.words if of_kind and not of_kind.explored else ""
         if what:
             raise StoreError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
         if taken := ADDRESS.intersection(dims):
@@ -77,10 +77,10 @@ class Source:
     @cached_property
     def variables(self) -> list[str]:
         """Names of the variables with one number per cell; counts and derived quantities come first."""
-        found = [str(n) for n, v in self.cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
-        found = [n for n in found if self.cell[n].dtype.kind in "fiub"]
+        names = [str(n) for n, v in self.cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
+        names = [n for n in names if self.cell[n].dtype.kind in "fiub"]
         first = ("reversals", "reversals_predicted", *quantities.DERIVED, "status", "t_stop", "t_last_reversal")
-        return [*(n for n in first if n in found), *(n for n in found if n not in first)]
+        return [*(n for n in first if n in names), *(n for n in names if n not in first)]
 
     @cached_property
     def cell(self) -> xr.Dataset:

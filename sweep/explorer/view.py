@@ -56,7 +56,7 @@ class View:
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._cell = Div(sizing_mode="stretch_width", name="cell")
         self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
-        self._figures = Curves()
+        self._figures = Curves(str(PARTS.empty()))
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
         self._document.js_on_event("document_ready", self._figures.player.moment)

@@ -1,7 +1,7 @@
 """Integrate the turning of bodies and their path on the table, along trajectories that are known at some instants.
 
 From each state the motion goes on to the next instant in steps of dopri5 as long as those of the trajectory, with
-heading and path as further unknowns.  So both have the order of the trajectory, whose kernel knows nothing of them, and
+heading and path as further unknowns.  So both have the order of the trajectory, whose kernel does not have them, and
 all stretches between two instants are stepped side by side.
 """
 

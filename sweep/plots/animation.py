@@ -56,18 +56,18 @@ def animate(
         check(path)
     if speed is not None and not speed > 0:
         raise fault_of(f"{speed:g}; give a number above zero", "speed")
-    found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
-    if not body.drawable(found):
+    shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
+    if not body.drawable(shown):
         raise fault_of("its bodies have no attitude, or no a, b and c; animate trajectories of slip or noslip")
-    if (bodies := found.sizes["trajectory"]) > MOST:
+    if (bodies := shown.sizes["trajectory"]) > MOST:
         raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}")
-    last = float(found["time"][-1])
-    end = min(_until(found) if end is None else end, last)
+    last = float(shown["time"][-1])
+    end = min(_until(shown) if end is None else end, last)
     if not begin < end:
         raise fault_of(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
     seconds = SECONDS if speed is None else (end - begin) / speed
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
-    scene = _Scene(found, np.linspace(begin, end, count))
+    scene = _Scene(shown, np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:
         _save(animation, path)

@@ -89,9 +89,9 @@ def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
     printed : whether it is for print
     """
     ours = _STYLE | (_PRINT if printed else {})
-    found = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
+    unchanged = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
     # The panels set the height; this one only keeps the size from being taken for matplotlib's default.
-    return found | ({"figure.figsize": [width, width / 2]} if width else {})
+    return unchanged | ({"figure.figsize": [width, width / 2]} if width else {})
 
 
 class Picture(Figure):

@@ -68,9 +68,9 @@ def _evaluated(
     # No critical spin depends on the start.
     starts = {name: value.numbers[0] for name, value in config.parameters.items() if name in START}
     grid = Grid({name: np.array(values) for name, values in axes}, {**starts, **dict(fixed)})
-    found = predict(config.tier, grid).variables
+    predicted = predict(config.tier, grid).variables
     return {
         name: xr.DataArray(values.reshape(grid.shape), grid.axes, grid.dims)
-        for name, values in found.items()
+        for name, values in predicted.items()
         if name.startswith("n_c")
     }

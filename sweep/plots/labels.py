@@ -111,11 +111,11 @@ def constants(dataset: xr.Dataset) -> str:
 
     Parameters of a rattleback whose default is zero are left out where they are zero.
     """
-    found = {str(name): float(v) for name, v in dataset.coords.items() if v.ndim == 0 and v.dtype.kind in "fi"}
+    numbers = {str(name): float(v) for name, v in dataset.coords.items() if v.ndim == 0 and v.dtype.kind in "fi"}
     if not is_of_own_body(dataset):
-        found = {name: at for name, at in found.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
-    ordered = [name for name in parameters(dataset) if name in found]
-    fixed = [measured(dataset, name, found[name]) for name in dict.fromkeys([*ordered, *found])]
+        numbers = {name: at for name, at in numbers.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
+    ordered = [name for name in parameters(dataset) if name in numbers]
+    fixed = [measured(dataset, name, numbers[name]) for name in dict.fromkeys([*ordered, *numbers])]
     known = {str(name): v.attrs["distribution"] for name, v in dataset.coords.items() if "distribution" in v.attrs}
     sampled = [f"{symbol(name)}: {words}{si_unit(dataset, name)}" for name, words in known.items()]
     return ", ".join([*fixed, *sampled])

@@ -110,7 +110,7 @@ def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
 
 def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
     """Return the indices of these values along their axes."""
-    found = {}
+    nearest = {}
     for name, wanted in sel.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
@@ -126,8 +126,8 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
         if not low - beyond <= at <= high + beyond:
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             raise fault_of(f"{name} = {at:g} is far from all its values, {span}; choose one of them", "sel")
-        found[name] = int(np.abs(values - at).argmin())
-    return found
+        nearest[name] = int(np.abs(values - at).argmin())
+    return nearest
 
 
 def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:

@@ -155,13 +155,13 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
 
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
     """Draw a dataset of any kind."""
-    found = kind(dataset)
-    if found and found in _OWN and (found != CRITICAL or variable is None):
-        options = {"variable": variable if found != TRAJECTORY else None, **axes, **how}
+    of_kind = kind(dataset)
+    if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
+        options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, **how}
         if given := [name for name, value in options.items() if value]:
-            raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
+            raise fault_of(f"not for a figure of {of_kind.words}; leave it out", given[0])
         require_whole(dataset)
-        return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
+        return _OWN[of_kind](dataset) if variable is None else trajectories.draw(dataset, variable)
     chosen = panels.choose(dataset, variable, **axes, alone=is_column())
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:

@@ -1,4 +1,4 @@
-"""List what can be drawn of a dataset: its variables, quantities derived from them, and its subject.
+"""List the quantities of a dataset that can be drawn: its variables, quantities derived from them, and its subject.
 
 Pictures and the explorer share these.  This needs the dataset alone, and no plotting library.
 """

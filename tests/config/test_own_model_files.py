@@ -78,7 +78,7 @@ BROKEN = {
     "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
     "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS' are unknown; choose paper, "),
     "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "parameter 'nu' is unknown"),
-    "no period": after(PENDULUM, "    slower_period=", "    # ", "give it slower_period, or do not offer COUNT"),
+    "no period": after(PENDULUM, "    slower_period=", "    # ", "define slower_period, or do not offer COUNT"),
     "no motion at the end": (
         PENDULUM.replace("2 + columns", "1.5 - columns").replace("0.5 + 0 * columns", "np.inf + columns"),
         line_of(PENDULUM, "    fastest_motion"), "the fastest motion is 0, from which steps follow"),

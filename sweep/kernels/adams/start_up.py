@@ -3,7 +3,7 @@
 The slip does not start at its slow value, the one that follows from the slow variables.  Short steps of dopri5 resolve
 the transition, and leave a first history.  The stiff method goes on from this with plain weights, and doubles its
 step until it reaches the final one.  `LANES` trajectories that need the same number of doublings run side by side.
- Each is computed independently, so their choice does not matter.
+Each is computed independently, so their choice does not matter.
 """
 
 from __future__ import annotations

@@ -157,7 +157,7 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
     ----------
     sizes : sizes α of the modes as the state holds them, shape (cells, 2)
     lifts : present s of the modes, whose true sizes are α e^-s, shape (cells, 2)
-    spin, step, tolerance : of shape (cells,), the tolerance being that of a spin
+    spin, step, tolerance : of shape (cells,), where the tolerance is in spin
     left : number of steps to the time limit, shape (cells,)
     """
     with np.errstate(all="ignore"):

@@ -117,7 +117,7 @@ def _stribeck(square, p):
 
 
 _C = 3 * np.pi / 8
-"""Force over a circle where d is small, over d."""
+"""The force of `contensou` for small d, divided by d."""
 
 
 @inline
