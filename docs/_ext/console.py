@@ -1,9 +1,9 @@
 """Commands, their output and pictures: ```{console} runs its lines that begin with `$ ` while the pages are built.
 
 The commands of a page run one after the other, in a folder of its own that holds the repository's `configs` and films.
-Progress bars are left out.  What a command prints goes to a file if it ends with `> FILE`, and a ```{code-block} with a
-caption is a file.  ```{picture} shows an image file that an earlier command of the page has written.  ```{python} runs
-a complete program in the same folder and shows the picture that it draws with pyplot.
+Progress, on standard error, is left out.  What a command prints goes to a file if it ends with `> FILE`, and a
+```{code-block} with a caption is a file.  ```{picture} shows an image file that an earlier command of the page has
+written.  ```{python} runs a complete program in the same folder and shows the picture that it draws with pyplot.
 """
 
 from __future__ import annotations
@@ -41,15 +41,9 @@ class _Running(SphinxDirective):
 
     def _python(self, shown: str, *arguments: str) -> str:
         """Return the output; a failure is reported with the text that the page shows."""
-        done = subprocess.run(
-            [sys.executable, *arguments],
-            cwd=self._folder(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+        done = subprocess.run([sys.executable, *arguments], cwd=self._folder(), capture_output=True, text=True)
         if done.returncode:
-            raise self.error(f"{shown}:\n{done.stdout}")
+            raise self.error(f"{shown}:\n{done.stdout}{done.stderr}")
         return done.stdout
 
     def _block(self, text: str, language: str) -> nodes.literal_block:
@@ -105,7 +99,7 @@ class Console(_Running):
         output = self._python(command, *words[1:])
         if target:
             (self._folder() / target).write_text(output, encoding="utf-8")
-        return [] if target else [line for line in output.splitlines() if "━" not in line]
+        return [] if target else output.splitlines()
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
