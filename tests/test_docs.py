@@ -6,8 +6,8 @@ must be a configuration; a ```{code-block} with a caption is a file.  A block th
 it that says why: <!-- not run: takes minutes -->.  With <!-- campaign: takes a minute --> it is run among the
 campaigns alone.
 
-What a page shows as output is made when the pages are built, by ```{code-cell} and ```{console}.  A page that has
-nothing else is run then alone.
+What a page shows as output is made when the pages are built, by ```{code-cell}, ```{console} and ```{python}.  A page
+that has nothing else is run then alone.
 """
 
 import pkgutil
@@ -79,7 +79,7 @@ def commands(block: Block) -> list[str]:
 
 def _runs(page: Path, *when: str) -> list[Block]:
     """The blocks to run, none if building the pages runs all of them."""
-    kinds = ("console", "{console}", "python", "{code-cell}", "yaml", "{code-block}")
+    kinds = ("console", "{console}", "python", "{python}", "{code-cell}", "yaml", "{code-block}")
     found = [block for block in blocks(page) if block.kind in kinds and block.when in when]
     return found if {block.kind for block in found} & {"console", "python", "yaml"} else []
 
@@ -120,8 +120,11 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def _run_command(block: Block, command: str) -> None:
     words = shlex.split(command, comments=True)
     assert words[:3] == ["python", "-m", "sweep"], f"{block}: {command}: only sweep's own commands are run"
+    words, target = (words[:-2], words[-1]) if words[-2] == ">" else (words, "")
     result = CliRunner().invoke(main, words[3:])
     assert result.exit_code == 0, f"{block}: {command}\n{result.output}"
+    if target:
+        Path(target).write_text(result.stdout, encoding="utf-8")
 
 
 def _check_configuration(block: Block, folder: Path) -> None:
@@ -144,7 +147,12 @@ def test_what_a_page_shows_runs(
     page: Path, when: list[str], checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:  # fmt: skip
     names: dict[str, Any] = {}
-    for block in _runs(page, *when):
+    found = _runs(page, *when)
+    if found[0].kind == "{code-cell}":  # Sphinx runs a notebook in its own folder
+        folder = checkout / page.relative_to(ROOT).parent
+        folder.mkdir(parents=True, exist_ok=True)
+        monkeypatch.chdir(folder)
+    for block in found:
         if block.kind in ("console", "{console}"):
             for command in commands(block):
                 _run_command(block, command)
@@ -154,10 +162,24 @@ def test_what_a_page_shows_runs(
             head, _, text = block.text.partition("\n\n")
             (checkout / head.removeprefix(":caption: ")).write_text(text, encoding="utf-8")
         else:
-            # Sphinx runs a notebook in its own folder.
-            monkeypatch.chdir(checkout / "docs" / "tutorial" if block.kind == "{code-cell}" else checkout)
             code = re.sub(r"\A(:\w.*\n)+", "", block.text)
             exec(compile(code, str(block), "exec"), names)
+
+
+_DRAWS = re.compile(
+    r"python -m sweep (run|plot|trajectory|animate|critical|boundaries|indices|fit|explore)\b(?!.*--dry)"
+)
+_OF_OTHER_THINGS = {"cluster", "develop", "reproduce", "resume"}
+"""How-to pages whose commands draw, but which are about something else, or take minutes."""
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "how-to").glob("*.md")), ids=_name)
+def test_how_to_pages_that_draw_show_a_figure_soon(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    figure = re.search(r"^```\{(picture|image|python)\}", text, re.MULTILINE)
+    draws = bool(_DRAWS.search(text)) and page.stem not in _OF_OTHER_THINGS
+    assert bool(figure) >= draws
+    assert not figure or text.count("\n## ", 0, figure.start()) <= 1
 
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "data" / "README.md", ROOT / "scripts" / "LOG.md"], ids=_name)
@@ -227,7 +249,7 @@ def test_the_finding_says_how_far_the_formula_is_off() -> None:
 
 @pytest.mark.campaign
 def test_the_picture_of_the_readme_is_what_the_program_draws(tmp_path: Path) -> None:
-    """To renew it: `sweep.plot(sweep.run("configs/mu_b.yaml", n0=0.05), output="docs/_static/map.png")`."""
+    """To renew it: `python scripts/pictures.py`."""
     sweep.plot(sweep.run(ROOT / "configs" / "mu_b.yaml", n0=0.05), output=tmp_path / "map.png")
     # Letters may be rendered a little differently.
     assert compare_images(str(ROOT / "docs" / "_static" / "map.png"), str(tmp_path / "map.png"), tol=10) is None

@@ -9,8 +9,9 @@ import pytest
 from support import ROOT
 
 PAGES = [ROOT / "README.md", *ROOT.glob("docs/*.md"), *ROOT.glob("docs/[!_]*/*.md"), *ROOT.glob("configs/*.yaml")]
-ROOMS = ("cli", "config", "results", "studies", "engine", "report", "reproduce", "bench")
-SOURCES = [path for room in ROOMS for path in sorted((ROOT / "sweep" / room).glob("*.py"))] + [
+ROOMS = ("cli", "config", "results", "studies", "engine", "report", "reproduce", "bench",
+         "models", "kernels", "plots", "explorer")  # fmt: skip
+SOURCES = [path for room in ROOMS for path in sorted((ROOT / "sweep" / room).rglob("*.py"))] + [
     ROOT / "sweep" / f"{name}.py" for name in ("api", "parameters", "variables", "units", "faults", "progress", "grid")
 ]
 
@@ -33,13 +34,16 @@ BETTER = {
     r"\bTell (whether|where|which|if|how|what)\b": "return, find, check",
     r"\bof (a|the) user\b(?![-'])": "user-defined, a user's",
     r"\b[Ss]o many (?!(as|that|of)\b)": "this many, the number of",
-    r"\b(center|color|behavior|neighbor|gray)(s|ed|ing)?\b": "the British spelling",
+    r"(?<!lower )(?<!right )\b(center|color|behavior|neighbor|gray)(s|ed|ing)?\b": "the British spelling",
 }
 _NOT_PROSE = re.compile(r"^ *```.*?^ *```$|<!--.*?-->|`[^`]*`|\$\$?[^$]+\$\$?|\]\([^)]*\)", re.MULTILINE | re.DOTALL)
 
 
 def prose(path: Path) -> str:
-    """Return a file with spaces in place of all that is not English: of Python, strings and comments stay."""
+    """Return a file with spaces in place of all that is not English: of Python, strings and comments stay.
+
+    A string of one word is a name, such as a colour's.
+    """
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         return text
@@ -47,6 +51,8 @@ def prose(path: Path) -> str:
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type in (tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", -1)):
             (top, left), (bottom, right) = token.start, token.end
+            if token.type == tokenize.STRING and " " not in token.string:
+                continue
             for k in range(top - 1, bottom):
                 first, last = left if k == top - 1 else 0, right if k == bottom - 1 else len(lines[k])
                 lines[k][first:last] = text.splitlines()[k][first:last]

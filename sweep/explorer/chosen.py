@@ -54,7 +54,7 @@ class CellControls:
             self._quiet = False
 
     def show_ends(self, curves: Sequence[Curve | None]) -> None:
-        """Show how each trajectory ended, and the time that its run took."""
+        """Show how each trajectory ended, and how long its run took."""
         lines = []
         for k, curve in enumerate(curves):
             if curve and curve.whole:
@@ -78,7 +78,7 @@ class CellControls:
 
 
 class _Input:
-    """A field for a number, and on an axis of the dataset a slider as well, logarithmic where the axis is."""
+    """A field for a number, with a slider for an axis of the dataset, logarithmic if the axis is."""
 
     def __init__(self, source: Source, parameter: Parameter, edited: Callable[[float], None]) -> None:
         name = parameter.name
@@ -99,6 +99,6 @@ class _Input:
         """Show a value."""
         self.field.value = f"{value:.6g}"
         if self.slider and self._axis:
-            with np.errstate(divide="ignore", invalid="ignore"):  # a value that no logarithmic axis has
+            with np.errstate(divide="ignore", invalid="ignore"):  # a value that a logarithmic axis cannot have
                 place = float(self._axis.straight(np.array(value)))
             self.slider.value = place if np.isfinite(place) else self.slider.start

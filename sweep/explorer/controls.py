@@ -28,9 +28,9 @@ class MapControls:
     """Widgets to choose the variable, the axes of the map, and the values of other axes."""
 
     def __init__(self, source: Source, change: Callable[[Callable[[State], State]], None]) -> None:
-        """`change` is called with what the visitor makes of the state."""
+        """`change` is called with a function that makes the visitor's choice in a state."""
         self._source, self._change = source, change
-        # An axis of one value leaves no choice, and Bokeh has no slider that ends where it starts.
+        # An axis of one value leaves no choice, and a slider of Bokeh cannot end where it starts.
         self._choices = {name: one for name, one in choices(source).items() if not one.axis or len(one.options) > 1}
         self._widgets = {name: self._widget(choice) for name, choice in self._choices.items()}
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}

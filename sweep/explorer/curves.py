@@ -19,7 +19,7 @@ from sweep.grid import Array
 from sweep.plots import labels, theory
 
 _STRETCHES = 3000
-"""Stretches of a long curve; only the lowest and the highest sample of each stretch are drawn."""
+"""Number of stretches of a long curve; only the lowest and the highest sample of each are drawn."""
 
 _OVER_TIME = ("spin", "energy", "dissipated")
 
@@ -30,7 +30,11 @@ _LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "backgrou
 class Curves:
     """The figures of the trajectories, with `MAX_CELLS` curves each."""
 
-    def __init__(self) -> None:
+    def __init__(self, hint: str) -> None:
+        """`hint` is the HTML that is shown without curves."""
+        self._hint = models.Div(text=hint, sizing_mode="stretch_width")
+        self.root = models.Column(self._hint, sizing_mode="stretch_width", name="curves")
+        """The hint, or the figures once they have curves: Bokeh warns of a figure without data."""
         self.spin, self.energy = _figure(260, "spin"), _figure(190, "energies")
         self.energy.x_range = self.spin.x_range
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
@@ -54,8 +58,9 @@ class Curves:
         present = [curve.dataset for curve in curves if curve]
         if present:
             self._label(present[0])
-        for part, series in ((self.spin, "spin"), (self.energy, "energy")):
-            part.visible = any(series in one for one in present)
+        parts = {"spin": self.spin, "energy": self.energy}
+        figures = [part for series, part in parts.items() if any(series in one for one in present)]
+        self.root.children = [*figures] or [self._hint]
         end = max([float(one["time"].max()) for one in present], default=1.0)
         chosen = curves[active] if active < len(curves) else None
         if (chosen, end) != self._played:

@@ -1,4 +1,4 @@
-"""Export what is shown: the curves as a table, and the configuration of the slice and of its trajectories."""
+"""Export the page: the curves as a table, and the configuration of the slice and of its trajectories."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def stem(source: Source) -> str:
 
 
 def csv(curves: Sequence[Curve | None]) -> str:
-    """The samples of all trajectories, one a line, below a line of names and units."""
+    """The samples of all trajectories, one per line, below a line of names and units."""
     tables = [_table(curve.dataset, k) for k, curve in enumerate(curves, 1) if curve]
     return "".join(t.to_csv(index=False, header=t is tables[0], float_format="%.10g", na_rep="nan") for t in tables)
 
@@ -46,7 +46,7 @@ def yaml(source: Source, setup: Setup, state: State) -> str:
     if "case" in source.dims:
         lines.append("# The cases of the table are left out; this is the first of them.")
     if "sample" in source.dims:
-        lines.append("# The samples are left out; the medians of their distributions stand for them.")
+        lines.append("# The samples are left out; the medians of their distributions replace them.")
     return "\n".join([*lines, config.to_yaml()])
 
 

@@ -1,8 +1,9 @@
-"""The map of a slice as a Bokeh figure: one image, patterns that the browser draws over it, and hover by index.
+"""The map of a slice as a Bokeh figure: one image, patterns that the browser draws over it, and tooltips by index.
 
-Under it stand cuts along the row and the column of the cell under the pointer, which the browser draws too.
+Below it are cuts along the row and the column of the cell under the pointer, which the browser draws too.
 
-An image and a table of bits are sent as binary arrays, without a glyph per cell, so that a million cells stay fluid.
+An image and a table of bits are sent as binary arrays, without a glyph per cell, so that a million cells can be shown
+smoothly.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ _BAR = {
 class MapFigure:
     """The map over two axes, which shows one slice after another.
 
-    The models stay the same from slice to slice: a browser does not forget models that are replaced.
+    The models stay the same from slice to slice, because a browser keeps models that are replaced.
     """
 
     def __init__(self, source: Source, x: str, y: str) -> None:
@@ -52,7 +53,7 @@ class MapFigure:
         place = {"x": ex[0], "y": ey[0], "dw": ex[-1] - ex[0], "dh": ey[-1] - ey[0]}
         self.figure = plot = _frame(source, self._x, self._y)
         self._cells = ColumnDataSource({"image": [np.zeros((1, 1), "uint8")], "kinds": [np.zeros((1, 1), "uint8")]})
-        # Two images, because an image goes on with the mapper that it was made with.
+        # Two images, because an image keeps its first colour mapper.
         self._images = [
             plot.image(image="image", source=self._cells, color_mapper=mapper, **place)
             for mapper in (
@@ -83,7 +84,7 @@ class MapFigure:
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
     def show(self, state: State) -> tuple[Map, Scale]:
-        """Show the variable of a state; returns its map, and how its values become colours."""
+        """Show the variable of a state; returns its map and its colour scale."""
         part = self._source.map(state.show, *self.axes, state.at)
         scale = style.scale_of(part, state)
         logarithmic = style.is_logarithmic(scale)
@@ -112,7 +113,7 @@ class MapFigure:
             ticker = models.FixedTicker(ticks=list(words), minor_ticks=[]) if words else models.BasicTicker()
             cut["plot"].yaxis.update(ticker=ticker, major_label_overrides=words)
         self.figure.title.text = self._source.label(part.name)
-        # A new bar, because an old one leaves out ticks beyond its first scale.
+        # A new bar, because an old one omits ticks beyond its first scale.
         self.figure.right = [self._bar(part, scale, mapper)]
         flags = {str(k): words for k, words in part.flags.items()}
         code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
@@ -193,6 +194,7 @@ def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
     """Make the figure of a cut along an axis, with the data that `cut` of page.js needs to fill it."""
     plot = figure(
         height=_CUT_HEIGHT, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, x_range=span,
+        y_range=models.Range1d(),  # set with the data: Bokeh warns of a range by data if all of them are missing
         x_axis_type=style.kind(axis), x_axis_label=source.label(axis.name), name=f"cut along {axis.name}", title=" ",
         outline_line_color=None,
     )  # fmt: skip

@@ -105,6 +105,9 @@ const sweep = (() => {
       const cell = (k) => n ? k * across + i : j * across + k
       const value = Array.from(at, (_, k) => bits[cell(k)] & blank ? NaN : values[cell(k)])
       plot.renderers[0].data_source.data = {at, value, here: value.map((v, k) => k === along ? v : NaN)}
+      const known = value.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known)
+      const room = high > low ? (high - low) / 20 : 1
+      if (known.length) plot.y_range.setv({start: low - room, end: high + room})
       plot.title.text = other ? `at ${other.symbol} = ${number(other.values[n ? i : j])}` : " "
     })
   }

@@ -35,7 +35,7 @@ def dress(document: Document, source: Source, query: str) -> None:
 
 
 def legend(part: Map, scale: Scale) -> str:
-    """The patterns and lines that occur in a map, and what lies beyond its scale, as HTML."""
+    """The patterns and lines that occur in a map, and the values beyond its scale, as HTML."""
     items = [(style.swatch(kind), words) for kind, words in part.legend.items()]
     lines = {line.words: figure.LINES[line.name] for line in part.lines}
     items += [(f"border-top:{2 * width}px {dash} currentColor", words) for words, (dash, width) in lines.items()]

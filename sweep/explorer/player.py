@@ -1,4 +1,4 @@
-"""Plays a trajectory: its body turns on the table in perspective, above the path of its contact point."""
+"""Play a trajectory: its body turns on the table in perspective, above the path of its contact point."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from sweep.explorer.style import GRID, SOFT
 from sweep.plots import body, labels
 
 _MOMENTS = 20_000
-"""Samples sent to the browser, at most."""
+"""Largest number of samples sent to the browser."""
 
 
 class Player:
     """The body of one trajectory, and the controls that play it; everything happens in the browser."""
 
     def __init__(self, over_time: list[Any]) -> None:
-        """`over_time` are the figures in which a line marks the moment."""
+        """Add a line that marks the time to the figures `over_time`."""
         self.figure = plot = figure(
             height=260, min_width=220, sizing_mode="stretch_width", tools="", toolbar_location=None, name="body",
             match_aspect=True, outline_line_color=None,
         )  # fmt: skip
         plot.axis.visible = plot.grid.visible = False
-        self._table = models.ColumnDataSource({"xs": [], "ys": []})
+        self._table = models.ColumnDataSource({"xs": [[0.0]], "ys": [[0.0]]})  # else Bokeh warns of axes without range
         self._motion, self._shape = models.ColumnDataSource(), models.ColumnDataSource()
         faces = models.ColumnDataSource({"xs": [], "ys": [], "colour": []}, syncable=False, name="faces")
         trace = models.ColumnDataSource({"x": [], "y": []}, syncable=False)
@@ -48,7 +48,7 @@ class Player:
             other.add_layout(line)
         parts = {"motion": self._motion, "shape": self._shape, "faces": faces, "trace": trace, "line": line,
                  "clock": clock}  # fmt: skip
-        self.controls = self._controls(parts)
+        self.root = models.Column(plot, self._controls(parts), sizing_mode="stretch_width", name="played")
 
     def _controls(self, parts: dict[str, Any]) -> models.Column:
         button = models.Toggle(label="▶ Play", width=84, syncable=False, name="play")
@@ -60,7 +60,7 @@ class Player:
             ("0.002", "0.2 %"), ("0.02", "2 %"), ("0.2", "20 %"), ("1", "all")])  # fmt: skip
         parts |= {"slider": self._slider, "speed": speed, "button": button, "trail": trail}
         self.moment = moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
-        """Draws the moment of the slider."""
+        """Draws the body at the time of the slider."""
         for model, change in (
             (self._slider, "value"), (self._slider, "end"), (trail, "value"), (self._motion, "data"),
         ):  # fmt: skip
@@ -73,17 +73,17 @@ class Player:
     def show(self, curve: Curve | None, colour: str, end: float) -> None:
         """Show the body of a curve, if its attitude and shape are known; the slider goes to the time `end`."""
         self._slider.update(end=end, step=end / 2000)
-        self.figure.visible = self.controls.visible = curve is not None and body.drawable(curve.dataset)
-        if not curve or not self.figure.visible:
+        self.root.visible = curve is not None and body.drawable(curve.dataset)
+        if not curve or not self.root.visible:
             self._motion.data = {"time": [], "turn": [], "contact": [], "path": []}
             return
         one = curve.dataset
         self._slider.tags = [labels.unit(one, "time")]
         times = one["time"].values[:: -(-one.sizes["time"] // _MOMENTS)]
         moving = body.moving(one, times)
-        moving.look(_camera())
+        moving.look(_camera(), moving.reach)
         matrix = _camera().get_proj()
-        seen = [proj3d.proj_transform(*line, matrix) for line in moving.table]
+        seen = [proj3d.proj_transform(*line, matrix) for line in moving.table(moving.reach)]
         self._table.data = {"xs": [x for x, *_ in seen], "ys": [y for _, y, _ in seen]}
         self._shape.data = {
             "points": [moving.points], "tones": [moving.colours(colour)], "matrix": [matrix],

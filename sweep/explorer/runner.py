@@ -27,18 +27,18 @@ from sweep.plots.trajectories import lively_until, reversal_times
 from sweep.studies.trajectory import choose, intervals, trajectory
 
 LONG = 30_000.0
-"""Time at which a trajectory without an end (`t_end: .inf`) ends."""
+"""End of a trajectory without a time limit (`t_end: .inf`)."""
 
 MAX_STEPS = 1e8
-"""A trajectory that takes more steps ends with these: an address may name any friction, and so any length of steps."""
+"""Largest number of steps of a trajectory: an address may ask for any friction, and so for any number of steps."""
 
 MAX_SAMPLES = 200_000
-"""Samples of a trajectory, at most: longer ones are sampled more coarsely."""
+"""Largest number of samples of a trajectory; longer ones are sampled more coarsely."""
 
 COMPILING = "compiling the simulation for this machine; later runs find it in the cache"
 
 _STRETCHES = tuple(0.25**k for k in range(4, -1, -1))
-"""A trajectory is run to these shares of its time in turn, so that the first of its curve is seen at once."""
+"""A trajectory is run to these shares of its time in turn, so that the beginning of its curve appears at once."""
 
 _REPORT_EVERY = 0.1
 """Seconds between two reports of progress."""
@@ -55,11 +55,11 @@ class Curve:
     seconds: float
     """The time that the run took."""
     whole: bool = True
-    """False if the curve goes on."""
+    """Whether the curve is complete."""
 
 
 class Dropped(Exception):
-    """Raised to end a run for which nobody waits."""
+    """Raised to end a run that is no longer needed."""
 
 
 @dataclass(eq=False)
@@ -79,21 +79,21 @@ class Job(Reporter):
     over: bool = False
     """Whether the job has ended."""
     dropped: bool = False
-    """Set when nobody waits any more: the run ends at its next chunk, and `report` is not called again."""
+    """Set when the job is no longer needed: the run ends at its next chunk, and `report` is not called again."""
     t_end: float = 1.0
     """The time at which the run ends."""
     rest: Iterator[Curve] = field(default_factory=lambda: iter(()))
-    """Runs it further."""
+    """Continues the run."""
     _reported: float = 0.0
 
     def news(self, delay: str = "") -> None:
-        """Report that something has changed, unless nobody waits."""
+        """Report a change, unless the job is no longer needed."""
         self.delay, self._reported = delay, time.perf_counter()
         if not self.dropped:
             self.report(self)
 
     def chunk(self, progress: Progress) -> None:
-        """Report how far the run is; end it by `Dropped` if nobody waits."""
+        """Report the progress of the run; end it by `Dropped` if it is no longer needed."""
         if self.dropped:
             raise Dropped
         self.share = max(self.share, progress.done / self.t_end)
@@ -102,7 +102,7 @@ class Job(Reporter):
 
 
 def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
-    """Run the trajectory of a cell, with the usual measurements, to later and later times: one curve after another.
+    """Run the trajectory of a cell, with the usual measurements, to ever later times, and yield each curve.
 
     The last one goes to `t_end`, or, once the trajectory has settled, a while after its last event (`lively_until`).
     """
@@ -129,7 +129,7 @@ def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
 
 
 class Runner:
-    """Runs requested trajectories, the first stretch of each before the later stretches of the others."""
+    """Run requested trajectories, the first stretch of each before the later stretches of the others."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
@@ -148,8 +148,8 @@ class Runner:
             job.news(COMPILING)
 
     def _work(self) -> None:
-        # A trajectory has work for one thread.  Others would wait for it busily, and where cores are shared it for
-        # them: ten times as long.
+        # One thread suffices for a trajectory.  Further threads would wait busily, and on shared cores make it ten
+        # times as slow.
         load_numba().set_num_threads(1)
         with showing(self._compiling):
             while True:
@@ -166,7 +166,7 @@ class Runner:
             return
         except ConfigError as error:
             job.fault = error.faults[0].message if error.faults else str(error)
-        except Exception as error:  # shown on the page: this thread has to go on
+        except Exception as error:  # shown on the page, because this thread has to continue
             job.fault = printable(f"{type(error).__name__}: {error}")
         job.over = job.over or bool(job.fault)
         if not job.over:
@@ -185,7 +185,7 @@ class Runner:
 
 
 class Drawn:
-    """At most `MAX_CELLS` cells in the order in which they were chosen, one of which is active."""
+    """The chosen cells, at most `MAX_CELLS`, in the order of their choice; one of them is active."""
 
     def __init__(self, cells: Iterable[Cell], runner: Runner | None, report: Callable[[Job], None]) -> None:
         """`report` is called with each job that changes, on the thread of the runner."""
@@ -222,11 +222,11 @@ class Drawn:
         self.active = max(min(self.active, len(self._jobs) - 1), 0)
 
     def running(self) -> Iterator[tuple[int, Job]]:
-        """The places of the cells that are run, and their runs."""
+        """Yield the places of the cells whose runs are in progress, and these runs."""
         return ((k, job) for k, job in enumerate(self._jobs) if not job.over)
 
     def leave(self) -> None:
-        """Give up all runs."""
+        """Drop all runs."""
         for job in self._jobs:
             job.dropped = True
 

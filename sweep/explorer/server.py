@@ -21,7 +21,7 @@ from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 
 PORTS = range(5006, 5106)
-"""Tried in turn where no port is asked for, so that a link to the only explorer holds."""
+"""Ports tried in turn if none is requested, so that links to a single explorer stay valid."""
 
 _SECONDS = 60.0
 """Longest wait for an explorer to start or to end."""
@@ -35,7 +35,7 @@ class Beside:
     height: int
     """Pixels in a notebook."""
     close: Callable[[], None]
-    """Ends it."""
+    """Ends the server."""
 
     def _repr_html_(self) -> str:
         return f'<iframe src="{self.url}" width="100%" height="{self.height}" style="border: 0"></iframe>'
@@ -60,14 +60,14 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
 
 
 def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int | None = 0) -> Beside:
-    """Serve until it is closed or this process ends, and return at once; by default at any port that is free."""
+    """Serve until it is closed or this process ends, and return at once; by default on any free port."""
     _quieten()
     began, ended = Future[tuple[str, asyncio.AbstractEventLoop]](), asyncio.Event()
 
     async def work() -> None:
         try:
             server = _server(source, setup, port)
-        except Exception as error:  # raised where the explorer was asked for
+        except Exception as error:  # raised in the caller's thread
             began.set_exception(error)
             return
         server.start()
@@ -75,7 +75,7 @@ def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int
         await ended.wait()
         server.stop()
         server.unlisten()
-        await asyncio.sleep(0.1)  # until its connections are closed
+        await asyncio.sleep(0.1)  # waits until its connections are closed
 
     thread = threading.Thread(target=lambda: asyncio.run(work()), daemon=True, name="explorer")
     thread.start()
@@ -89,7 +89,7 @@ def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int
 
 
 def _server(source: Source, setup: Setup | None, port: int | None) -> Server:
-    """Bokeh's server on a port, or on the first of `PORTS` that is free; it refuses pages of other sites."""
+    """Make Bokeh's server on a port, or on the first free one of `PORTS`; it refuses pages of other sites."""
     fill = view.make(source, setup)
     for each in PORTS if port is None else [port]:
         try:
@@ -97,15 +97,15 @@ def _server(source: Source, setup: Setup | None, port: int | None) -> Server:
         except OSError as error:
             last = error
             continue
-        server._tornado.websocket_origins.add(f"127.0.0.1:{server.port}")  # beside localhost
-        for listening in server._http._sockets.values():  # whose connections inherit it: else clicks wait 40 ms twice
+        server._tornado.websocket_origins.add(f"127.0.0.1:{server.port}")  # as well as localhost
+        for listening in server._http._sockets.values():  # else each click waits 40 ms twice
             listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return server
     raise OSError(last.errno, last.strerror, f"port {port or f'{PORTS[0]} to {PORTS[-1]}'}")
 
 
 def _quieten() -> None:
-    """Keep off the terminal what Bokeh and Tornado log of pages that close, and of files that browsers ask for."""
+    """Keep log messages of Bokeh and Tornado about closing pages and requested files off the terminal."""
     for name in ("bokeh.server.views.ws", "tornado.access"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     # The last words of a page that closes under load find no session, which Bokeh asserts; and an address may name an

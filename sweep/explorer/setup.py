@@ -18,12 +18,12 @@ Announce = Callable[[str], None]
 
 
 class Setup:
-    """The configuration that runs the dataset's trajectories, and the parameters of a cell that are not named.
+    """The configuration that runs the dataset's trajectories, and the default parameters of a cell.
 
     Parameters
     ----------
-    model : the file or entry point of the model, if a user brought it; its code runs
-    announce : called with a line of words before it runs
+    model : the file or entry point of a user's model; its code runs
+    announce : called with a line of text before it runs
 
     Raises
     ------
@@ -41,11 +41,11 @@ def why_still(source: Source) -> str:
     """Explain why trajectories of a file that is not `usable` cannot be run."""
     if place := source.dataset.attrs.get("model_place"):
         return f"Its model is user code, {place}; name it to run trajectories: sweep explore FILE --model MODEL."
-    return "This file has no configuration to run trajectories from."
+    return "This file has no configuration for trajectories."
 
 
 def usable(source: Source) -> Setup | None:
-    """The setup of the dataset, None if it has no configuration to run trajectories from."""
+    """The setup of the dataset; None if it has no configuration for trajectories."""
     try:
         return Setup(source)
     except ConfigError:
@@ -55,11 +55,11 @@ def usable(source: Source) -> Setup | None:
 def _named(source: Source, model: str) -> dict[str, str]:
     """The keys by which the configuration names the user's model, which runs only if its hash is the dataset's.
 
-    The file that the dataset names does not matter: the dataset may come from anybody.
+    The file name in the dataset is ignored, because the dataset may come from anybody.
     """
     wanted, words = source.dataset.attrs.get("model_sha256"), ""
     if wanted is None:
-        words = f"no user brought the model of {source.name}; leave the option out"
+        words = f"the model of {source.name} is not a user's; leave the option out"
     elif model.endswith(SUFFIX):
         model = str(Path(model).absolute())
     elif entry_point(model) is None:
@@ -70,9 +70,9 @@ def _named(source: Source, model: str) -> dict[str, str]:
 
 
 def _configuration(source: Source, named: dict[str, str], announce: Announce | None) -> Config:
-    """The configuration in the dataset, as far as trajectories need it.
+    """The parts of the dataset's configuration that trajectories need.
 
-    It may come from anybody, so that a model in it that is a file or an entry point is refused, not run, unless the
+    It may come from anybody, so a model in it that is a file or an entry point is refused and not run, unless the
     user has named it.
     """
     config = configuration(source.dataset, named, announce)

@@ -21,11 +21,11 @@ from sweep.results.netcdf import open_dataset
 from sweep.results.store import StoreError
 
 IN_MEMORY = 2_000_000
-"""Cells up to which a dataset is read as a whole; of a larger one, each slice is read when it is shown."""
+"""Largest number of cells of a dataset that is read as a whole; slices of a larger one are read when they are shown."""
 
 
 class PlacedAxis(Axis):
-    """An axis as Bokeh draws it: an image has cells of one size, so that uneven values stand at equal distances."""
+    """An axis as Bokeh draws it: an image has cells of one size, so uneven values are drawn at equal distances."""
 
     @cached_property
     def drawn_edges(self) -> Array:
@@ -42,7 +42,7 @@ class PlacedAxis(Axis):
 
 
 ADDRESS = frozenset({"x", "y", "show", "beside", "palette", "spacing", "low", "high", "cell"})
-"""The keys of an address that are no axes (`sweep.explorer.state`)."""
+"""The keys of an address other than axes (`sweep.explorer.state`)."""
 
 
 class Source:
@@ -57,8 +57,8 @@ class Source:
     def __init__(self, dataset: xr.Dataset, name: str = "dataset") -> None:
         cells = dataset["status"] if "status" in dataset else next(iter(dataset.data_vars.values()), None)
         dims = () if cells is None else tuple(str(d) for d in cells.dims)
-        found = kind(dataset)
-        what = "no axis" if not dims else found.words if found and not found.explored else ""
+        of_kind = kind(dataset)
+        what = "no axis" if not dims else of_kind.words if of_kind and not of_kind.explored else ""
         if what:
             raise StoreError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
         if taken := ADDRESS.intersection(dims):
@@ -70,21 +70,21 @@ class Source:
         self.axes = {d: PlacedAxis(d, along(self.dataset, d)) for d in self._all_dims()}
 
     def _all_dims(self) -> list[str]:
-        """The dimensions of the cells, then those further ones along which a variable lists several values a cell."""
+        """The dimensions of the cells, followed by those along which a variable has several values per cell."""
         of_cells = [v.dims for v in self.dataset.data_vars.values() if set(self.dims) & set(v.dims)]
         return list(dict.fromkeys(map(str, chain(self.dims, *of_cells))))
 
     @cached_property
     def variables(self) -> list[str]:
-        """Names of the variables with a number per cell, counts and derived quantities first."""
-        found = [str(n) for n, v in self.cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
-        found = [n for n in found if self.cell[n].dtype.kind in "fiub"]
+        """Names of the variables with one number per cell; counts and derived quantities come first."""
+        names = [str(n) for n, v in self.cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
+        names = [n for n in names if self.cell[n].dtype.kind in "fiub"]
         first = ("reversals", "reversals_predicted", *quantities.DERIVED, "status", "t_stop", "t_last_reversal")
-        return [*(n for n in first if n in found), *(n for n in found if n not in first)]
+        return [*(n for n in first if n in names), *(n for n in names if n not in first)]
 
     @cached_property
     def cell(self) -> xr.Dataset:
-        """One cell with all that is derived, for the names, units and types of the variables."""
+        """One cell with all derived quantities, for the names, units and types of the variables."""
         return quantities.with_derived(self.dataset.isel({d: slice(1) for d in self.axes}).load())
 
     def dims_of(self, name: str) -> set[str]:
@@ -110,7 +110,7 @@ class Source:
         return describe(part, name, x, y)
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
-        """The parameters `names` of the cell at `index`, as far as the dataset has them; the first on further axes."""
+        """The parameters `names` of the cell at `index`, if the dataset has them; on further axes, the first value."""
         there = {name: self.dataset.coords[name] for name in names if name in self.dataset.coords}
         return {name: float(known.isel({d: index.get(str(d), 0) for d in known.dims})) for name, known in there.items()}
 

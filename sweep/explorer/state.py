@@ -20,22 +20,22 @@ from sweep.plots.quantities import subject
 from sweep.plots.scales import LARGEST
 
 MAX_CELLS = 6
-"""Curves over each other; as many as there are colours that everybody can distinguish."""
+"""Largest number of curves over each other: the number of colours that everybody can distinguish."""
 
 LIMITS = {"low": "colours from", "high": "to"}
-"""The ends of the colour scale, and what the page calls them."""
+"""The ends of the colour scale, and their labels on the page."""
 
-# Limits below this are zero: of smaller numbers a logarithmic scale overflows.
+# Smaller limits count as zero, because a logarithmic scale would overflow.
 _ZERO = 1e-100
 
-# Unknown keys of an address that are named.
+# Largest number of unknown keys of an address in a message.
 _NAMED = 5
 
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
 
 _ENDED = ("beside", "spacing")
-"""Keys of links of older versions, which are left out."""
+"""Keys of links from older versions, which are ignored."""
 
 PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coolwarm")
 """Colour maps of matplotlib to choose from; without one a variable has its default."""
@@ -49,13 +49,13 @@ class State:
     y: str
     """Empty for a dataset of one axis."""
     show: str
-    """One of the source's variables."""
+    """The variable, one of the source's."""
     at: Mapping[str, int] = field(default_factory=dict)
     """The index on each axis that is not drawn."""
     cells: tuple[Cell, ...] = ()
     palette: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
-    """Ends of the colour scale that the visitor has chosen; the values set the others."""
+    """Ends of the colour scale that the visitor has chosen; the values determine the others."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Choice:
     words: Sequence[str]
     """The options in the words of the page."""
     axis: Axis | None = None
-    """The axis of the dataset on which the options are places."""
+    """The axis of the dataset whose values are the options; empty for other choices."""
 
     def find(self, text: str) -> int | None:
         """The option that an address names, which may be any number on an axis; None if there is none."""
@@ -98,7 +98,7 @@ class Choice:
 
 
 def choices(source: Source) -> dict[str, Choice]:
-    """All that can be chosen of the map of a dataset, by name."""
+    """All choices for the map of a dataset, by name."""
     axes = list(source.axes), [source.words(d) for d in source.axes]
     found = [Choice("show", "variable", source.variables, [*map(source.words, source.variables)])]
     found.append(Choice("x", "horizontal axis", *axes))
@@ -113,7 +113,7 @@ def choices(source: Source) -> dict[str, Choice]:
 
 
 def first(source: Source) -> State:
-    """The state when the address asks for nothing: the dataset's subject over its two longest axes, as in a picture."""
+    """The state for an address without a query: the dataset's subject over its two longest axes, as in a picture."""
     about = subject(source.dataset)
     show = about if about in source.variables else source.variables[0]
     dims = [str(d) for d in source.cell[show].dims]
@@ -124,7 +124,8 @@ def first(source: Source) -> State:
 
 
 def write(state: State, source: Source, base: Cell) -> str:
-    """The query of the address that opens `state`; of a cell it names what lies on an axis or differs from `base`."""
+    """The query of the address that opens `state`; for a cell it has the values that lie on an axis or differ from
+    `base`."""
     chosen = {name: c.options[c.of(state)] for name, c in choices(source).items() if name not in (state.x, state.y)}
     pairs = [(name, option) for name, option in chosen.items() if option]
     pairs += [(name, f"{state.limits[name]:.12g}") for name in LIMITS if name in state.limits]
@@ -137,16 +138,16 @@ def write(state: State, source: Source, base: Cell) -> str:
 def read(
     query: Mapping[str, Sequence[str]], source: Source, base: Cell, known: Mapping[str, Parameter] = PARAMETERS
 ) -> tuple[State, list[str]]:
-    """The state that an address asks for, and what in it cannot be done and is left out.
+    """Read the state from an address, with a message for each part that is invalid and left out.
 
     Parameters
     ----------
     query : the values of each key of the query
     base : the parameters of a trajectory that a cell does not name; empty where none can be run
-    known : what they are, by name
+    known : the records of these parameters, by name
     """
     state, faults, unknown, all_choices = first(source), list[str](), list[str](), choices(source)
-    # Limits come last, because another variable does away with them.
+    # Limits come last, because a change of the variable resets them.
     for key, values in sorted(query.items(), key=lambda pair: pair[0] in LIMITS):
         choice = all_choices.get(key)
         if choice and (k := choice.find(values[-1])) is not None:
@@ -186,9 +187,9 @@ def wrong_value(parameter: Parameter, value: float) -> str:
 
 
 def _cell(text: str, base: Cell, known: Mapping[str, Parameter]) -> Cell:
-    """The cell that an address names; `ValueError` if there is none."""
+    """Read the cell that an address names; `ValueError` if it is invalid."""
     if not base:
-        raise ValueError("this file has no configuration from which a trajectory could be run")
+        raise ValueError("this file has no configuration for trajectories")
     cell = dict(base)
     for pair in text.split(",", len(base)):
         name, _, value = pair.partition(":")

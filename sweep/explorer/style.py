@@ -33,7 +33,7 @@ CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
 """Colours of curves, from Okabe and Ito: safe for the colour-blind."""
 
 _TICKS = 12
-"""Ticks of an axis whose values are listed one by one, at most."""
+"""Largest number of ticks of an axis whose values are listed one by one."""
 
 _AXES = {
     "axis_line_color": SOFT, "major_tick_line_color": SOFT, "minor_tick_line_color": None,
@@ -46,14 +46,14 @@ _MOST = 4096
 _WHITE, _BLACK, _DARK, _LIGHT = 0xC8FFFFFF, 0x90000000, 0xFF474340, 0xFFA8A39E  # ABGR; 0 is transparent
 
 _EXAMPLE = "#21918c"
-"""A colour of a map under a pattern that lets it be seen."""
+"""A colour of a map under a transparent pattern."""
 
 
 # ---- axes
 
 
 def style(plot: Any, *shown: PlacedAxis) -> None:
-    """Give the axes of a figure their style; of those that are `shown`, uneven values are listed one by one."""
+    """Give the axes of a figure their style; uneven values of the axes `shown` are listed one by one."""
     for drawn in plot.axis:
         drawn.update(formatter=numbers(), **_AXES)
     for axis, drawn in zip(shown, (plot.xaxis[0], plot.yaxis[0]), strict=False):
@@ -89,7 +89,7 @@ def mapping(scale: Scale) -> dict[str, Any]:
 
 
 def scale_of(part: Map, state: State) -> Scale:
-    """The scale of a map, with whatever of it the visitor has chosen; all values of flags have their colours."""
+    """The scale of a map, with the visitor's choices; all values of flags have colours."""
     palette = state.palette or None
     if part.flags:
         return scales.flags(part.flags, palette)
@@ -123,7 +123,7 @@ def _tile(side: int, colour: Callable[[Array, Array], Array]) -> Array:
 
 
 def _lines(across: Array) -> Array:
-    """White lines, with black beside them, where a distance from the lines is 0 and 1."""
+    """White lines next to black ones, where the distance from the lines is 0 and 1."""
     return np.select([across == 0, across == 1], [_WHITE, _BLACK], 0)
 
 
@@ -136,7 +136,7 @@ TILES = {
     "inferred": _tile(6, lambda x, y: np.where(x < 2, _lines(y), 0)),
     "noise_limited": _tile(8, lambda _, y: _lines(y)),
 }
-assert [*TILES, "uncertain"] == list(marks.WORDS)  # which has a dot
+assert [*TILES, "uncertain"] == list(marks.WORDS)  # drawn as a dot
 
 
 def swatch(kind: str) -> str:

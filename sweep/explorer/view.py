@@ -56,20 +56,16 @@ class View:
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._cell = Div(sizing_mode="stretch_width", name="cell")
         self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
-        self._figures = Curves()
+        self._figures = Curves(str(PARTS.empty()))
         self._controls = controls.MapControls(self._source, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
-        self._hint = Div(text=str(PARTS.empty()), sizing_mode="stretch_width")
-        shown = self._figures
-        curves = Column(self._hint, shown.spin, shown.energy, sizing_mode="stretch_width", name="curves")
-        player = Column(shown.player.figure, shown.player.controls, sizing_mode="stretch_width", name="played")
-        self._document.js_on_event("document_ready", shown.player.moment)
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, curves, player,
-                     self._chosen.root, self._buttons()):  # fmt: skip
+        self._document.js_on_event("document_ready", self._figures.player.moment)
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, self._figures.root,
+                     self._figures.player.root, self._chosen.root, self._buttons()):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
-        """Call a function of page.js."""
+        """Call a function in page.js."""
         self._calls.data = {"name": [name], "given": [given]}
 
     # ---- the map
@@ -145,10 +141,10 @@ class View:
         self._draw_cells()
 
     def _report(self, job: Job) -> None:
-        """Pass on a change of a run, on the thread of the trajectories."""
+        """Pass a change of a run on to the page; called on the thread of the trajectories."""
         try:
             self._document.add_next_tick_callback(partial(self._update, job))
-        except AttributeError:  # Bokeh takes the document of a closed page apart before it says so
+        except AttributeError:  # Bokeh dismantles the document of a closed page before it reports the closing
             job.dropped = True
 
     def _update(self, job: Job) -> None:
@@ -181,11 +177,10 @@ class View:
     def _draw_curves(self) -> None:
         curves = self._drawn.curves
         if not any(curves) and any(self._drawn.running()):
-            return  # the last curves stay until the first is there: figures that went and came back took 0.3 s
+            return  # the last curves stay until the first new one is there, because making the figures anew takes 0.3 s
         self._curves = curves
         named = enumerate(zip(self._names(), curves, strict=True), 1)
         names = [f"{k}: {name}{_counted(curve)}" for k, (name, curve) in named]
-        self._hint.visible = not any(curves)
         self._figures.show(curves, names, self._drawn.active)
         self._chosen.show_ends(curves)
 
@@ -208,7 +203,7 @@ class View:
         return states.write(self.state, self._source, self._base)
 
     def _buttons(self) -> Row:
-        """Make the buttons that copy the address and save what is seen."""
+        """Make the buttons that copy the address and save the figures."""
         link = Button(label="Copy link", name="link", width=92)
         link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
         png = Button(label="PNG", name="png", width=64)
@@ -218,7 +213,8 @@ class View:
         files = [Button(label=label, name=label, width=76) for label in ("CSV", "YAML") if self._setup]
         for button in files:
             button.on_click(partial(self._save, button.label))
-        # The calls travel with a root: what a callback of the document alone refers to is not kept up to date.
+        # The calls are attached to a root, because models that only a callback of the document refers to are not
+        # updated.
         return Row(link, png, *files, name="save", tags=[self._calls], stylesheets=[controls.WIDGETS],
                    styles={"flex-wrap": "wrap"})  # fmt: skip
 

@@ -1,15 +1,15 @@
-"""Compiles into the cache what kernels need, each piece in a process of its own, side by side.
+"""Compile the pieces of kernels into the cache, side by side, each in its own process.
 
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A PIECE is `kernel`, or what else runs need: `images` and `endings`, `samples` for a misfit, `path` for single
-trajectories, and `approach` once a trajectory has failed.  A MODEL that a user brings is "name@digest", and
-the record of its origin comes as a line of standard input.
+A PIECE is `kernel`, or another part that runs need: `images` and `endings`, `samples` for a misfit, `path` for single
+trajectories, and `approach` once a trajectory has failed.  For a user's model, MODEL is "name@digest", and the
+record of its origin comes as a line of standard input.
 
-Processes, because the code that Numba executes right after compiling is not the code that it caches: functions that a
-kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of sums differ (seen
-in `work` of adams: 4e-16, in 9 % of 4048 cells).  A run that always takes its kernel from the cache gives the same bits
-as the run after it.
+Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
+functions that a kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of
+sums differ (seen in `work` of adams: 4e-16, in 9 % of 4048 cells).  A run that always takes its kernel from the cache
+gives the same bits as the run after it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from sweep.models.user import loading
 from sweep.models.user.blame import blamed
 
 Job = tuple[tuple[str, ...], Origin | None]
-"""The arguments of this module, and where the model comes from."""
+"""The arguments of this module, and the origin of the model."""
 
 KERNEL, IMAGES, ENDINGS, SAMPLES, PATH, APPROACH = "kernel", "images", "endings", "samples", "path", "approach"
 
@@ -55,24 +55,24 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
 """The compiled functions of each piece."""
 
 _SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, SAMPLES: 3.0, PATH: 4.0, APPROACH: 4.0}
-"""Time to compile a piece that is no kernel (`scripts/LOG.md`: `run_costs`)."""
+"""Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""
 
 
 def build(kernels: Iterable[Kernel], *also: str) -> None:
-    """Compile what the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
+    """Compile the pieces that the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
     `also` names further pieces: `PATH` to follow how bodies turn and travel, `APPROACH` to look at failures.
 
-    What is missing after that, because a process failed or there is no folder for a cache, is compiled where it is
-    first used.
+    Anything still missing afterwards, because a process failed or there is no folder for a cache, is compiled where it
+    is first used.
 
     Raises
     ------
     ConfigError
-        if a model that a user brings cannot be compiled.
+        if a user's model cannot be compiled.
     """
     kernels = list(kernels)
     if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.advancing.is_compiled()]:
@@ -84,18 +84,18 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
 
 
 def missing(kernels: Sequence[Kernel], *also: str) -> list[Job]:
-    """List what the cache lacks to run `kernels`; `also` as of `build`."""
+    """List the pieces that the cache lacks to run `kernels`; `also` as in `build`."""
     return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel, also)))
 
 
 def compile_seconds(jobs: Sequence[Job]) -> float:
-    """Roughly how long it takes to compile `jobs` side by side."""
+    """Estimate the time to compile `jobs` side by side."""
     each = [METHODS[piece[1]].compile_seconds if piece[0] == KERNEL else _SECONDS[piece[0]] for piece, _ in jobs]
     return max(max(each, default=0.0), sum(each) / threads())
 
 
 def try_compiling(model: Model) -> None:
-    """Compile the inline functions of a model one by one, so that a `ConfigError` tells the line of a fault."""
+    """Compile the inline functions of a model one by one, so that a `ConfigError` gives the line of a fault."""
     numba, states = load_numba(), (0.0,) * len(model.states)
     constants = model.constants(*(0.0 for _ in model.constants._fields))
     with blamed(model.origin):
@@ -105,7 +105,7 @@ def try_compiling(model: Model) -> None:
 
 
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Name what the cache lacks to run `kernel`, by the arguments of this module, the longest first."""
+    """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
     samples = [SAMPLES] if Misfit.name in kernel.measure else []
     for piece in (KERNEL, IMAGES, ENDINGS, *samples, *also):
         if any(function.is_missing() for function in _PIECES[piece](kernel)):
@@ -132,7 +132,7 @@ def _start(job: tuple[str, ...], origin: Origin | None) -> subprocess.Popen[byte
     command = [sys.executable, "-m", __name__, *job]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     if origin and process.stdin:
-        with suppress(BrokenPipeError):  # it has failed: what it was to compile stays missing
+        with suppress(BrokenPipeError):  # it has failed: its piece stays missing
             process.stdin.write(json.dumps(vars(origin)).encode() + b"\n")
             process.stdin.flush()
     return process
@@ -151,7 +151,7 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
     else:
         model = find(name)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    gc.disable()  # to look for cycles among what Numba keeps takes a twentieth of the time
+    gc.disable()  # the garbage collector's search for cycles takes a twentieth of the time
     for function in _PIECES[piece](make_kernel(method, model, measure)):
         function.compile()
 

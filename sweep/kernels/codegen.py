@@ -1,9 +1,9 @@
-"""Generates source: straight-line code on scalars, under file names that tracebacks and debuggers can find.
+"""Generate source: straight-line code on scalars, under file names that tracebacks and debuggers can find.
 
 A loop over states would need arrays, and arrays inside the loop over lanes prevent LLVM from vectorising across
-trajectories.  So whatever depends on the number of states, or on a list of functions, is written out.
-`python -m sweep.kernels.source METHOD MODEL` prints the source that is generated for a kernel, and tells what each
-function in it is bound to.
+trajectories.  So everything that depends on the number of states, or on a list of functions, is written out.
+`python -m sweep.kernels.source METHOD MODEL` prints the source generated for a kernel, and what each function in it
+is bound to.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def make_load(names: Sequence[str], layout: Layout, record=None):
 
 
 def make_gather(arguments: str, places: Iterable[str], record=None):
-    """Compiled (arguments) -> what is at `places`, expressions, as a tuple or as the `NamedTuple` `record`."""
+    """Compiled (arguments) -> the values of the expressions `places`, as a tuple or as the `NamedTuple` `record`."""
     made = f"{'record' if record else ''}{tuple_of(places)}"
     return compile_inline("load", arguments, [f"return {made}"], {"record": record})
 
@@ -35,9 +35,9 @@ def make_store(names: Sequence[str], layout: Layout):
 
 
 def make_access(model: Model, layout: Layout, states: Sequence[str] = ()):
-    """Make what a loop over lanes begins and ends with: load the states, load the constants, store the states.
+    """Make the functions that begin and end a loop over lanes: load the states, load the constants, store the states.
 
-    See `make_load` and `make_store`; `states` stand in place of those of the model.
+    See `make_load` and `make_store`; `states` replace those of the model.
     """
     states = states or model.states
     load_constants = make_load(constants_of(model), layout, model.constants)
@@ -51,7 +51,7 @@ def make_rest(n_states: int, spin_state: int):
 
 
 def call_all(name: str, arguments: str, functions: Sequence[Any]):
-    """Compiled (arguments) -> None: calls each of `functions`; if there is none, it leaves no instruction behind."""
+    """Compiled (arguments) -> None: calls each of `functions`; if there is none, it adds no instruction."""
     calls = [f"f{i}({arguments})" for i in range(len(functions))] or ["pass"]
     names = {f"f{i}": function for i, function in enumerate(functions)}
     return compile_inline(name, arguments, calls, names)
@@ -76,7 +76,7 @@ def _joined(name: str, arguments: str, functions: Sequence[Any], operator: str, 
 def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]):
     """Compiled (arguments) -> None: runs `lines` for each lane.
 
-    The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop over
+    The lines form the body of the loop itself.  In a separate function, LLVM would unroll the loop over
     lanes before inlining it, and nothing would be vectorised.
     """
     loop = ["full_width()", f"for lane in range({LANES}):", *(f"    {line}" for line in lines)]

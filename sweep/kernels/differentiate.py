@@ -1,4 +1,4 @@
-"""The directional derivative of a right-hand side, as straight-line source that is made by tracing it once.
+"""Derive the directional derivative of a right-hand side, as straight-line source, by tracing it once.
 
 Functions of a model are traced with `Dual` numbers, whose derivatives follow from the rules of calculus
 (`sweep.models.symbols`).  No difference is taken, so that every component keeps its relative precision however small it
@@ -32,11 +32,11 @@ _RULES: dict[Any, Callable[..., Any]] = {
     np.minimum: lambda r, a, b, da, db: choose("<", a, b, da, db),
     np.maximum: lambda r, a, b, da, db: choose(">", a, b, da, db),
 }
-"""The derivative of the value r of an operation, from what it is of and the derivatives of that."""
+"""The derivative of the value r of an operation, from its operands and their derivatives."""
 
 
 class Dual(np.lib.mixins.NDArrayOperatorsMixin):
-    """A number of the trace and its derivative."""
+    """A traced number and its derivative."""
 
     def __init__(self, value: Any, slope: Any) -> None:
         self.value, self.slope = value, slope
@@ -81,7 +81,7 @@ def make_extended(model: Model):
 
 
 def undifferentiable(model: Model) -> str:
-    """Why the right-hand side of a model cannot be differentiated; "" if it can."""
+    """Return why the right-hand side of a model cannot be differentiated; "" if it can."""
     try:
         make_extended(model)
     except (TypeError, AttributeError) as error:

@@ -1,9 +1,9 @@
-"""Finds out whether a trajectory really meets what stopped it: approaches a failure in ever shorter steps.
+"""Find out whether a failure is real, by approaching it in ever shorter steps.
 
 A step that is too long has stages at states that the trajectory never visits.  If one of these has no positive normal
-force, or no positive Painlevé denominator, the kernel stops, but the failure may be one of the step alone.  So from the
-last sound state the same motion is followed again in steps of dopri5 with error control.  A step with such a stage is
-tried again at half its length.  If this never ends, the failure is one of the body, and happens here and now.
+force, or no positive Painlevé denominator, the kernel stops, but the step alone may be at fault.  So the same motion
+is followed again from the last sound state, in steps of dopri5 with error control.  A step with such a stage is
+tried again at half its length.  If this never succeeds, the failure is one of the body, at this place and time.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _NEAR = 1e-6
 # is extrapolated, with an error of the order of its square.
 _UPRIGHT = 1e-5
 
-# Steps after which nothing is confirmed: two seconds.
+# Largest number of steps, which take two seconds; beyond it nothing is confirmed.
 _MOST_STEPS = 3_000_000
 
 
 def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Array, Array, Array, Array]:
-    """Find what happens to trajectories within a stretch of time.
+    """Find out what happens to trajectories within a stretch of time.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ def _make_follow(model: Model):
 
     @compiled
     def kind(y, p, infinite):
-        """Return what a very short step from `y` has met.
+        """Return the kind of failure that a very short step from `y` has met.
 
-        Its stages do not tell.  Where the denominator goes to zero the force goes to infinity, or stays finite because
-        the numerator goes to zero as well; then either sign may come first.  Where the body lifts off the force alone
-        goes to zero.
+        Its stages do not show it.  Where the denominator goes to zero the force goes to infinity, or stays finite
+        because the numerator goes to zero as well; then either sign may come first.  Where the body lifts off, only the
+        force goes to zero.
         """
         _, (_, _, force, denominator) = rhs(y, p)
         jams = (denominator <= 0.0) | (denominator < force)
@@ -101,7 +101,7 @@ def _make_follow(model: Model):
 
     @compiled
     def probe(y, p):
-        """Return what lies just ahead of `y`, where errors allow no step that is as long as the shortest.
+        """Return the kind of failure just ahead of `y`, where errors do not even allow the shortest step.
 
         Near the paradox the denominator goes to zero as the root of the time left.
         """

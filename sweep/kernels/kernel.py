@@ -1,8 +1,8 @@
-"""Defines what the kernels of all methods share: many trajectories advance side by side, each to its own end.
+"""Define what the kernels of all methods share: many trajectories advance side by side, each to its own end.
 
 The whole state of a trajectory is its *image*, one row of a table: states, constants, step, progress and
 measurements.  `advance` takes a table and a list of unfinished cells, and advances each cell by a number of
-blocks of steps.  Nothing is remembered outside the table, so writing it to disk is a checkpoint.  Every image
+blocks of steps.  Nothing is kept outside the table, so writing it to disk makes a checkpoint.  Every image
 evolves by itself, block after block, so the numbers cannot depend on which thread, group, lane or call
 handled a cell.
 """
@@ -26,14 +26,14 @@ FAILURE = ("failed_at", "failed_spin", "failed_error")
 there is none."""
 
 _PROGRESS = ("steps", "goal", "settles", "done", "status")
-"""How many steps lead to t_end, after how many the image stops, whether it stops (not zero) as soon as its spin can
-reverse no more, how many steps it has done, and its status."""
+"""The number of steps to t_end; the number after which the image stops; whether it stops (not zero) as soon as its spin
+can reverse no more; the number of steps done; and the status."""
 
 _BASE = ("step", "stable_step", *_PROGRESS, "energy_start", "energy", *FAILURE, *STABLE)
 """Quantities of every image."""
 
 STRETCH = 100.0
-"""The length of a step divides this evenly if t_end is a multiple of it, in sqrt(c/g).  So it does not depend on t_end:
+"""A step divides this time evenly if t_end is a multiple of it, in sqrt(c/g).  So its length does not depend on t_end:
 a run to a later time takes the same steps."""
 
 
@@ -44,21 +44,21 @@ def steps_to(t_end: float | Array, step: Array) -> Array:
 
 
 class Stepper:
-    """How a method steps: the base of one class for each method (see `sweep.kernels.method`)."""
+    """Base of the classes that take the steps, one for each method (see `sweep.kernels.method`)."""
 
     method: str
     """Its name in `METHODS`."""
     model: Model
     """The model in the variables in which it steps."""
 
-    # Friction only takes energy away.  If a body gains more than this share from one look to the next, the
+    # Friction only removes energy.  If a body gains more than this share from one look to the next, the
     # integration has gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5 (together with the
     # check of failures at a look) caught every spin that was off by more than 1e-4, and none that was right
     # to 1e-6.
     energy_gain = 1e-5
 
     def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
-        """Names of the quantities that it adds to an image, where the measurements ask for `follows`."""
+        """Names of the quantities that it adds to an image if the measurements require `follows`."""
         return ()
 
     def make_run_block(self, kernel: Kernel):
@@ -72,7 +72,7 @@ class Stepper:
         raise NotImplementedError
 
     def carry(self, kernel: Kernel, images: Array) -> None:
-        """Carry the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
+        """Advance the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
 
     def reached(self, table: Table, t_end: float | Array) -> Array:
         """Times of the states, shape (cells,)."""
@@ -88,12 +88,12 @@ class Stepper:
 
 
 class Kernel:
-    """A model, what is measured on it, and a stepper: the layout of the images, and the compiled loop around a block.
+    """Combine a model, its measurements and a stepper: the layout of the images, and the compiled loop around a block.
 
     Attributes
     ----------
     measure : the specs of the measurements
-    follows : what the measurements need in each step, out of `WORK`, `RIPPLE` and `TANGENT`
+    follows : which of `WORK`, `RIPPLE` and `TANGENT` the measurements need in each step
     constants : names of the quantities that hold the constants of the model
     advancing : the compiled function behind `advance`
     """
@@ -123,7 +123,7 @@ class Kernel:
         return parallel(advance, "(f8[:, ::1], i8[::1], i8, i8, i8, i8[::1])", name)
 
     def make_watch(self):
-        """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
+        """Inline (group, lane, accepted, y, p, spin, work, h, now): the work of all measurements after a step.
 
         y, p, spin : states, constants and spin before the step; the others as in `Step`
         """
@@ -139,7 +139,7 @@ class Kernel:
         return watch
 
     def hooks(self, make: str, *more) -> list[Any]:
-        """The functions that a hook of `Measurement` gives; `more` are its arguments besides the layout."""
+        """The functions that a hook of `Measurement` returns; `more` are its arguments besides the layout."""
         return [hook for each in self.measurements if (hook := getattr(each, make)(self.layout, *more))]
 
     def table(self, images: Array) -> Table:
@@ -186,19 +186,19 @@ class Kernel:
 
         Parameters
         ----------
-        blocks : of steps in every lane, after which to stop
-        least : blocks after which to stop where lanes have become idle; by default only when all cells have ended
+        blocks : number of blocks of steps in every lane, after which to stop
+        least : number of blocks after which to stop where lanes are idle; by default only when all cells have ended
 
         Returns
         -------
-        The blocks that the groups of lanes have taken in all.
+        The total number of blocks that the groups of lanes have taken.
         """
         done = np.zeros(threads(), np.int64)
         self.advancing(images, cells, blocks, blocks if least is None else least, len(done), done)
         return int(done.sum())
 
     def carry(self, images: Array) -> None:
-        """Carry the images that are `QUIET` to where steps are needed again."""
+        """Advance the images that are `QUIET` to where steps are needed again."""
         self.stepper.carry(self, images)
 
     def states(self, images: Array) -> Array:

@@ -16,7 +16,7 @@ from sweep.kernels.measures.measurement import Look
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.model import ENERGY, Model, never_decided
 
-# A trajectory settles only if its rattle could not carry the spin across a limit even with this many times its
+# A trajectory settles only if its rattle could not carry the spin across a limit even with this multiple of its
 # energy.
 SETTLE_MARGIN = 4.0
 
@@ -27,7 +27,7 @@ _AT_WORK = 0.75
 MAX_ENERGY = 1e300
 
 # A rattle that can only decay is set to exactly zero once its energy (amplitude squared) is below this: products of
-# such small numbers are denormal, and operations on these take up to a hundred times as long.
+# such small numbers are denormal, and operations on such numbers take up to a hundred times as long.
 NEGLIGIBLE = 1e-120
 
 
@@ -61,7 +61,7 @@ def make_advance(run_block, look, layout: Layout):
     @exactly_compiled
     def run_group(images, cells, blocks, least):
         wide()
-        # An idle lane computes on zeros.  What comes out is meaningless but harmless: its status keeps it from
+        # An idle lane computes on zeros.  The result is meaningless but harmless: its status keeps it from
         # being stored.
         group = np.zeros(n_rows * lanes)
         held = np.full(lanes, -1)
@@ -143,8 +143,8 @@ def make_look(model: Model, layout: Layout, may_settle, shown, measure, energy_g
             ends = SETTLED if settled & stops else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
-                # A rattle that can only decay needs no leap: it settles.  And no leap begins while a measurement has
-                # yet to follow the spin: a reversal just before it would go uncounted.
+                # A rattle that can only decay needs no leap: it settles.  No leap begins while a measurement has
+                # yet to follow the spin, or a reversal just before it would not be counted.
                 ends = QUIET if small & followed & (not ((bounded | settled) & stops)) else ends
             ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends
             status = ends if running else status
@@ -168,7 +168,7 @@ def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: boo
     """Inline (group, lane, spin, 2 E / I3) -> (bounded, settled, followed).
 
     `bounded` says whether upright spin is stable at this spin; `settled`, whether in addition the spin can reverse no
-    more, and the measurements agree; `followed`, whether these do.
+    more and the measurements agree; `followed`, whether the measurements agree.
 
     By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 moves the spin on a circle about the critical
     spin n_c of the mode: (n - n_c)² + e is constant.  While the mode decays the spin changes by sqrt(d² + e) - d with

@@ -1,4 +1,4 @@
-"""Says where the quantities of a trajectory are kept: in the table of images, and in the group of lanes of a thread.
+"""Define where the quantities of a trajectory are kept: in the table of images, and in the group of lanes of a thread.
 
 In the table an image is a row, so that a quantity is a column.  A group is transposed: there a quantity is a row, with
 one value per lane.
@@ -39,17 +39,17 @@ class Layout:
 
     names: tuple[str, ...]
     model: Any = None
-    """The one whose states and constants are among them."""
+    """The model whose states and constants are among them."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
 
     def index(self, name: str) -> int:
-        """Index of a quantity: of its column in the table of images, and of its row in a group."""
+        """Index of a quantity: its column in the table of images, and its row in a group."""
         return self.names.index(name)
 
     def at(self, name: str) -> int:
-        """Index in a group, as one array, at which the lanes of a quantity begin."""
+        """Index at which the lanes of a quantity begin in a group, taken as one array."""
         return self.index(name) * LANES
 
 

@@ -1,9 +1,9 @@
-"""Defines what an integration method is, and tells how to add one.
+"""Define what an integration method is, and explain how to add one.
 
 An explicit Runge-Kutta method is a record in `sweep.kernels.tableau`.  Any other is a `Method` record and a subclass of
 `sweep.kernels.kernel.Stepper`, in a file of its own, like `runge_kutta`; enter the record in `METHODS` of
 `sweep.kernels.methods`.  The configuration, the choice of the cheapest method, the provenance and the benchmark then
-know it.  Times and steps are in sqrt(c/g), spins in sqrt(g/c).
+include it.  Times and steps are in sqrt(c/g), spins in sqrt(g/c).
 
 A `Kernel` is a stepper with measurements.  The stepper names its `method` and its `model`, and implements
 
@@ -38,8 +38,8 @@ Tolerance = float | Array
 
 FIXED, ACCURACY, STABILITY, REPEAT, MISSED = range(5)
 STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability", REPEAT: "repeat", MISSED: "missed"}
-"""Names of what determined a step: the configuration, the tolerance, the stability limit of the method, that a longer
-one failed or missed the tolerance, or that no shorter one was tried although this one missed the tolerance too."""
+"""Names of the rules that determine a step: the configuration; the tolerance; the stability limit of the method; a
+longer step failed or missed the tolerance; this step missed it too, but no shorter one was tried."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,16 @@ class Method:
     summary: str
     """One line for the documentation."""
     stepper: Callable[[Model, float], Stepper]
-    """(model, tolerance) -> what takes its steps."""
+    """(model, tolerance) -> its stepper."""
     accurate_step: Callable[[Model, Columns, Array, Array, Tolerance], Array]
     """(model, columns, motion, decay, tolerance) -> the step that keeps the error in spin at t = 400 within the
     tolerance, shape (cells,), in sqrt(c/g), where `motion` is the `fastest_motion` and `decay` the `fastest_decay`."""
     stable_step: Callable[[Array], Array] | None = None
     """(decay) -> the longest stable step, shape (cells,), in sqrt(c/g); None if no limit is near."""
     step_words: str = ""
-    """The words for what limits an automatic step beside the tolerance, for the provenance; "" if nothing does."""
+    """The limit of an automatic step besides the tolerance, in words for the provenance; "" if there is none."""
     runs: Callable[[Model], bool] = lambda model: True
-    """(model) -> whether it can integrate this; by default it can integrate all."""
+    """(model) -> whether it can integrate this model; by default it can integrate all."""
     step_cost: float = 1.0
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
     start_up_cost: float = 0.0
@@ -70,15 +70,15 @@ class Method:
     compile_seconds: float = 6.0
     """Time to compile its kernel, for the estimate of a run (`scripts/LOG.md`: `run_costs`)."""
     companion: float = 1.5
-    """Ratio of the steps of the run that tells a cell's error to its own (`sweep.engine.errors`)."""
+    """Ratio of the steps of the companion run, which estimates a cell's error, to its own (`sweep.engine.errors`)."""
     error_order: int = 5
-    """The power of the step with which that error is taken to grow."""
+    """The power of the step with which that error is assumed to grow."""
     least_error: float = 0.0
-    """That error is told as at least this share of the geometric mean of what the tolerance allows and what the energy
-    balance tells; 0 if that mean tells nothing of it."""
+    """Lower limit of that error, as a share of the geometric mean of the tolerance and the violation of the energy
+    balance; 0 if that mean says nothing about it."""
     foresight: float = 0.0
-    """Number of steps ahead of the time limit from which on it may decide by what is left.  A trajectory that has
-    ended before does not depend on the limit."""
+    """Within this many steps of the time limit the method may take the remaining time into account.  A trajectory that
+    has ended before does not depend on the limit."""
     takes_every_step: bool = False
-    """It takes equal steps from t = 0 to the end, each by itself: a run may stop after any and go on from there towards
-    another goal, and a tangent can be carried along (`sweep.kernels.tangent`)."""
+    """Whether it takes equal, independent steps from t = 0 to the end: a run may then stop after any step and continue
+    towards another goal, and a tangent can be carried along (`sweep.kernels.tangent`)."""

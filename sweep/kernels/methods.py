@@ -15,12 +15,12 @@ from sweep.models.model import Array, Columns, Model
 from sweep.models.theory.linear import fastest_motion
 
 METHODS: dict[str, Method] = {method.name: method for method in (*map(runge_kutta.method, TABLEAUS), adams.METHOD)}
-"""The first is the plain one, which runs every model."""
+"""The first is the plain method, which runs every model."""
 
 PLAIN = next(iter(METHODS))
 
 AUTO = "auto"
-"""Stands in place of the name of a method: the cheapest is taken for each cell."""
+"""Stands in for the name of a method: the cheapest is chosen for each cell."""
 
 
 def allowed(model: Model) -> tuple[str, ...]:
@@ -31,7 +31,7 @@ def allowed(model: Model) -> tuple[str, ...]:
 def cheapest(model: Model, columns: Columns, tolerance: Tolerance, t_end: float) -> tuple[Array, Array, Array]:
     """Choose the method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
 
-    Returns the names of the methods, and step and rule as `automatic_step` gives them, each of shape (cells,).
+    Returns the names of the methods, with the step and rule of `automatic_step`, each of shape (cells,).
     """
     rates, names = (fastest_motion(model, columns), model.fastest_decay(columns)), allowed(model)
     found = [_step(METHODS[name], model, columns, *rates, tolerance) for name in names]

@@ -1,7 +1,7 @@
-"""Integrates how bodies turn and travel over the table, along trajectories that are known at some instants.
+"""Integrate the turning of bodies and their path on the table, along trajectories that are known at some instants.
 
 From each state the motion goes on to the next instant in steps of dopri5 as long as those of the trajectory, with
-heading and path as further unknowns.  So both have the order of the trajectory, whose kernel knows nothing of them, and
+heading and path as further unknowns.  So both have the order of the trajectory, whose kernel does not have them, and
 all stretches between two instants are stepped side by side.
 """
 
@@ -24,7 +24,7 @@ _NAMES = ("heading", "along", "across")
 
 
 def stretches(model: Model, states: Array, constants, interval: Array, step: Array) -> Array:
-    """What heading and path gain on stretches of trajectories of a model that has a `path`.
+    """The changes of heading and path on stretches of trajectories, for a model that has a `path`.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def stretches(model: Model, states: Array, constants, interval: Array, step: Arr
 
     Returns
     -------
-    The angle turned, and the displacement of the contact point along the directions that X and Y get by the heading at
+    The angle turned, and the displacement of the contact point along the directions of X and Y turned by the heading at
     the end; shape (3, stretches).
     """
     rows = np.concatenate([states, np.zeros((len(_NAMES), len(interval))), [*constants], interval[None]])

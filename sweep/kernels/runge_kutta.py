@@ -26,19 +26,19 @@ from sweep.models.model import Array, Columns, Model
 
 
 class RungeKutta(Stepper):
-    """Takes the steps of a tableau, for any model."""
+    """The stepper of a tableau, for any model."""
 
     def __init__(self, model: Model, tableau: Tableau) -> None:
         self.method, self.model, self.tableau = tableau.name, model, tableau
 
     def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
-        """Those of the tangent, if a measurement follows it."""
+        """The quantities of the tangent, if a measurement follows it."""
         return tangent.quantities(self.model) if TANGENT in follows else ()
 
     def images(
         self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
     ) -> Array:
-        """As `Kernel.images`; the steps taken are no longer than `step` and divide `t_end` evenly."""
+        """As `Kernel.images`; the steps are no longer than `step` and divide `t_end` evenly."""
         goal = steps_to(t_end, step)
         stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
         images = kernel.start(columns, t_end / goal, goal, stable_step, stable)
@@ -49,7 +49,8 @@ class RungeKutta(Stepper):
         return images
 
     def make_run_block(self, kernel: Kernel):
-        """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and then the tangents, if any, take the same."""
+        """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and then the same steps of the tangents, if
+        any."""
         run_block = self._make_steps(kernel)
         if TANGENT not in kernel.follows:
             return run_block
@@ -94,7 +95,7 @@ class RungeKutta(Stepper):
 def make_step(tableau: Tableau, rhs, n_states: int):
     """Inline (states, constants, h) -> (states, spin, work, sound, airborne, jammed): one step.
 
-    Returned are the states after the time h; the spin before the step; the integral of the dissipated power over the
+    Returns the states after the time h; the spin before the step; the integral of the dissipated power over the
     step, with the weights of the method; whether the normal force and the
     Painlevé denominator were positive in every stage (`sound`, which is also false where they are NaN);
     and whether in some stage the force (`airborne`) or the denominator (`jammed`) was zero or negative.
@@ -148,7 +149,7 @@ def _accurate_step(
     step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
     if not decay.any():
         return np.asarray(step)
-    # A slip that differs by v for a time 1/λ moves the rattle, of frequency ν, by (ν/λ)² of itself.
+    # A slip that differs by v for a time 1/λ changes the rattle, of frequency ν, by the share (ν/λ)².
     spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
     e = 2 * rattle / inertia
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

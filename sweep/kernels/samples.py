@@ -1,8 +1,8 @@
-"""Samples what a film shows of many trajectories at instants that they share: no images, no looks, no counts.
+"""Sample the quantity that a film shows, for many trajectories at common instants: no images, no looks, no counts.
 
 The steps are dopri5's, and a whole number of them leads from one instant to the next.  The number follows from a cell's
-own step, so that cells with the same step, as the columns of a Jacobian have, differ smoothly, and no cell depends on
-those beside it.
+own step, so that cells with the same step, such as the columns of a Jacobian, differ smoothly, and no cell depends on
+its neighbours.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model, stack
 
 Seen = Literal["spin", "gyroscope", "heading"]
-"""What a film can show."""
+"""The quantities that a film can show."""
 
 
 def sampled(
@@ -36,14 +36,14 @@ def sampled(
 ) -> Array:
     """Follow trajectories through the instants of a film, shape (cells, instants).
 
-    Values are NaN from where a body lifts off or a run diverges.  A model without attitude shows its spin to a
-    gyroscope, and its integral as the heading.
+    Values are NaN after a body lifts off or a run diverges.  For a model without attitude, a gyroscope shows the
+    spin, and the heading is the integral of the spin.
 
     Parameters
     ----------
     columns : physical parameters by name, each of shape (cells,)
     step : the longest steps wanted, in the model's unit of time as `times`, shape (cells,)
-    times : the instants, ascending, of which none is negative, shape (instants,)
+    times : the instants, ascending and not negative, shape (instants,)
     delay : from the start of each trajectory to `times` = 0, shape (cells,); by default there is none
     longest_delay : the number of steps of the delay follows from this, so that it does not depend on the delay
     """
@@ -61,7 +61,7 @@ def sampled(
 
 
 def in_lanes(rows: Array, needed: Array) -> tuple[Array, Array, Array]:
-    """Put cells that need about as many steps side by side.
+    """Put cells that need about the same number of steps side by side.
 
     Parameters
     ----------
@@ -145,6 +145,6 @@ def _spin(y, spin, axis):
 
 
 def _make_show(model: Model, what: Seen):
-    """Inline (states, constants) -> what a film shows."""
+    """Inline (states, constants) -> the quantity that a film shows."""
     shown = {"heading": "y[-1]", "gyroscope": "-y[4]" if model.path else ""}.get(what) or "energy(y, p)[0]"
     return compile_inline("show", "y, p", [f"return {shown}"], {"energy": model.energy})

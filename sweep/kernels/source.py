@@ -1,4 +1,4 @@
-"""Prints the source generated for a kernel: python -m sweep.kernels.source METHOD MODEL [MEASURE …]"""
+"""Print the source generated for a kernel: python -m sweep.kernels.source METHOD MODEL [MEASURE …]"""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from sweep.models.generated import GENERATED
 
 
 def main(method: str, model: str, *measure: str) -> None:
-    """Print each generated function under the file name by which tracebacks refer to it, and what it is bound to."""
+    """Print each generated function under its file name in tracebacks, and what its names are bound to."""
     make_kernel(method, find(model), measure)
     for name, names in GENERATED.items():
         print(f"# {name}", *_bound(names), "".join(linecache.getlines(name)), "", sep="\n")
 
 
 def _bound(names: dict[str, Any]) -> Iterator[str]:
-    """Tell where each function or class that a source refers to is defined, a line each."""
+    """Give the place where each function or class in a source is defined, one per line."""
     for name, value in names.items():
         if isinstance(value, type):
             yield f"#   {name}: {value.__module__}.{value.__qualname__}"

@@ -9,8 +9,8 @@ RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX, TOPPLED = range(7)
 QUIET = 7
 
 IMPOSSIBLE = 8
-"""Not run: there is no such body, or it does not stand upright at rest (`Model.impossible`)."""
+"""Not run: an impossible body, or one that does not stand upright at rest (`Model.impossible`)."""
 
 FAILURES = (LIFT_OFF, DIVERGED, PARADOX, TOPPLED)
 """Ends before the time limit.  A kernel gives the first three as first impressions, from the stages of a step that may
-have been too long; what really happened is found out by `sweep.kernels.failure` and `sweep.engine.failures`."""
+have been too long; `sweep.kernels.failure` and `sweep.engine.failures` find out what really happened."""

@@ -1,6 +1,6 @@
 """Explicit Runge-Kutta methods as data: Butcher tableaus.
 
-A record says what the kernel and the choice of the step need.  To add a method, write its record and enter it in
+A record holds what the kernel and the choice of the step need.  To add a method, write its record and enter it in
 `TABLEAUS`; `tests/kernels/test_tableau.py` then checks it.
 """
 
@@ -34,8 +34,8 @@ class Tableau:
     """Error constant: the phase of the fastest motion in a step at the default tolerance, in units of
     `Model.radians_a_step`.  The error falls with the power `order` of it."""
     layer_error: float
-    """Error constant of the start: the share of the slip's change that steps of `LAYER_STEP` decay times get wrong
-    while the slip, at first zero, comes to the value that the slow motion asks for.  It falls with the same power."""
+    """Error constant of the start: the relative error of the slip, with steps of `LAYER_STEP` decay times, while it
+    goes from zero to the value that follows from the slow motion.  It falls with the same power."""
 
     @property
     def stages(self) -> int:
@@ -67,4 +67,4 @@ DOPRI5 = Tableau(
 )
 
 TABLEAUS = (DOPRI5,)
-"""The methods of this kind; the first runs every model."""
+"""All tableaus; the first runs every model."""

@@ -1,11 +1,11 @@
-"""A tangent to each trajectory, carried along by the linearised flow: how fast neighbours part.
+"""A tangent to each trajectory, carried along by the linearised flow, shows how fast neighbours part.
 
 It is carried by the same Runge-Kutta formula, applied to the equations and their directional derivative together
 (`sweep.kernels.differentiate`): the exact derivative of the steps.  After each block of steps it is brought back to the
-length one, and the logarithm of what it has grown by is kept until the next (Benettin, Galgani, Giorgilli and Strelcyn
+length one, and the logarithm of its growth is kept until the next (Benettin, Galgani, Giorgilli and Strelcyn
 1980).  Lengths are those of the states as they are; which norm is taken does not matter in the long run.
 
-A neighbour at a small distance in place of the tangent would not do.  While one mode of the rattle grows, the other
+A neighbour at a small distance could not replace the tangent.  While one mode of the rattle grows, the other
 decays to less than 1e-8 of it, and the round-off in the difference of two trajectories fills it in again.  At a = 10,
 b = 3, δ = 0.288, n0 = 0.0325 that gave an exponent of 0.009 for a motion that has none.
 """
@@ -43,7 +43,7 @@ def _places(model: Model) -> tuple[str, ...]:
 
 
 def make_follow(step, model: Model, layout: Layout):
-    """Compiled (group) -> None: lets the tangents of all lanes catch up with their trajectories.
+    """Compiled (group) -> None: advances the tangents of all lanes to the time of their trajectories.
 
     `step` is that of the equations and their derivative, as made by `sweep.kernels.runge_kutta.make_step`.
     """
@@ -51,7 +51,7 @@ def make_follow(step, model: Model, layout: Layout):
     own, (load, load_constants, store) = make_load(model.states, layout), make_access(model, layout, names)
     squares = " + ".join(f"z[{i}] * z[{i}]" for i in range(n, 2 * n))
     length = compile_inline("length", "z", [f"return np.sqrt({squares})"], {"np": np})
-    # The states, and the tangent times a share.
+    # The states plus the tangent times a share.
     both = tuple_of([*(f"y[{i}]" for i in range(n)), *(f"share * z[{i}]" for i in range(n, 2 * n))])
     begin = compile_inline("begin", "y, z, share", [f"return {both}"], {})
     STEP, DONE, CAUGHT_UP, GREW = map(layout.at, ("step", "done", _DONE, GROWTH))
@@ -69,7 +69,7 @@ def make_follow(step, model: Model, layout: Layout):
                 store(group, lane, behind, new, z)
                 group[CAUGHT_UP + lane] += 1.0 if behind else 0.0
 
-    # Not in one function with the steps: beside the logarithms LLVM vectorised those less well.
+    # Separate from the steps, which LLVM vectorised less well next to the logarithms.
     @exactly_compiled
     def follow(group):
         wide()

@@ -1,11 +1,12 @@
 """How a body turns about the vertical and travels over the table.
 
 The axes of the table are X, Y and Z, upwards.  The body's own, x, y and z, downwards, come from (X, -Y, -Z) by turns of
--heading about z, of roll about x and of pitch about y, each time about the axis where it is by then:
+-heading about z, of roll about x and of pitch about y, each time about the axis in its current position:
 
     u = (cos(roll) sin(pitch), -sin(roll), -cos(roll) cos(pitch)).
 
-The heading, positive as the spin, is the one thing that u does not tell.  With h = sqrt(u1² + u3²) it obeys
+The heading, positive in the sense of the spin, is the one thing that does not follow from u.  With h = sqrt(u1² + u3²)
+it obeys
 
     heading' = (ω1 u1 + ω3 u3) / h²,
 
@@ -28,7 +29,7 @@ from sweep.models.vectors import Vector
 
 
 def of_rolling(contact):
-    """Make `Model.path` of the states (u1, u2, ω1, ω2, ω3) on a surface, of which `contact` tells the contact point."""
+    """Make `Model.path` for the states (u1, u2, ω1, ω2, ω3) on a surface whose contact point `contact` gives."""
 
     def path(y, along, across, p):
         return moving((*y, 0.0, 0.0), along, across, p)
@@ -38,7 +39,7 @@ def of_rolling(contact):
 
 
 def of_slipping(contact):
-    """As `of_rolling`, of the states (u1, u2, ω1, ω2, ω3, v1, v2)."""
+    """As `of_rolling`, for the states (u1, u2, ω1, ω2, ω3, v1, v2)."""
 
     def path(y, along, across, p):
         u1, u2, w1, w2, w3, v1, v2 = y

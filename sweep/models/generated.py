@@ -1,4 +1,4 @@
-"""Compiles source that is generated: straight-line code under file names that tracebacks and debuggers can find."""
+"""Compile generated source: straight-line code under file names that tracebacks and debuggers can find."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from sweep.jit import inline
 
 GENERATED: dict[str, dict[str, Any]] = {}
-"""What the names in each generated source are bound to, by the source's file name."""
+"""The bindings of the names in each generated source, by the source's file name."""
 
 
 def compile_inline(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]):
@@ -29,5 +29,5 @@ def compile_inline(name: str, arguments: str, lines: Iterable[str], names: dict[
 
 
 def tuple_of(items: Iterable[str]) -> str:
-    """The source of a tuple."""
+    """Return the source of a tuple."""
     return f"({' '.join(item + ',' for item in items)})"

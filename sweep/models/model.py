@@ -1,28 +1,29 @@
-"""Says what a model is, and how to add one.
+"""Define what a model is, and explain how to add one.
 
 A model is a system of autonomous ordinary differential equations y' = f(y) for the motion of a rattleback near upright
 spin.  It lives in one file, which defines one `Model` by the name `MODEL`; enter it in `sweep.models.__init__`.
 Kernels, executor, store and plots then work with it.  `averaged` is a short example.
 
-1. Choose the states, in such a way that all but one vanish in upright spin; the remaining one carries the spin
+1. Choose the states so that all but one vanish in upright spin; the remaining one carries the spin
    (`states`, `spin_state`).  A rattle then keeps its relative precision however small it becomes.
 2. Compute the coefficients and the starts of many cells at once, from arrays of parameters (`constants`, `start`).
 3. Write `rhs` and `energy` for one trajectory, on scalars.
-4. Say what the model depends on and what can be asked of it (`parameters`, `offers`).
-5. Say how fast it moves: by `slower_period` for counts, by `upright` or `fastest_motion` for steps, and by
+4. Declare what the model depends on and what it offers (`parameters`, `offers`).
+5. Declare how fast it moves: by `slower_period` for counts, by `upright` or `fastest_motion` for steps, and by
    `fastest_decay` if friction or anything else makes the model stiff.
 
-When it settles and what is shown of it have defaults that leave no instruction in a kernel.
+The conditions for settling and the displayed series have defaults that add no instruction to a kernel.
 
-A model of a user (`sweep.models.user`) may be of any body.  Where that has no upright spin, no state need vanish: the
-model does not offer `LINEAR`, tells its `fastest_motion`, and settles where it says that its spin is `decided`.
+A user's model (`sweep.models.user`) may describe any body.  If the body has no steady upright spin, none of its states
+has to vanish: the model does not offer `LINEAR`, gives its `fastest_motion`, and settles where its function `decided`
+says so.
 
 `constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
 again at every look.  The linear theory (`sweep.models.theory.linear`) calls `upright` and `rhs`, the latter with
 complex states.
 
-Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.  Equations that hold in any units say what
-sqrt(g/c) is in theirs (`spin_unit`).
+Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.  Equations that hold in any units give the
+value of sqrt(g/c) in their own units (`spin_unit`).
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ trajectories may settle; and Garcia and Hubbard's formula for the time of the fi
 
 
 OWN = "own"
-"""Units of a model that knows neither the paper's nor SI: the labels of the dataset then name none."""
+"""Units of a model that uses neither the paper's nor SI: the labels of the dataset then name no unit."""
 
 
 def zeros(columns: Columns) -> Array:
@@ -75,22 +76,22 @@ class Ripple:
 
 
 NO_RIPPLE = Ripple((), lambda columns: (), nothing)
-"""For a model whose spin does not ripple."""
+"""Used for a model whose spin does not ripple."""
 
 
 @inline
 def never_decided(y, p):
-    """The default `decided`: nothing is known beside the linear theory."""
+    """The default `decided`: nothing is known besides the linear theory."""
     return False
 
 
 def never_upright(spin) -> tuple[Any, ...]:
-    """The default `upright`: there is no such motion."""
+    """The default `upright`: the model has no such motion."""
     raise NotImplementedError
 
 
 def never_rocks(columns: Columns) -> Array:
-    """The default `slower_period`: there is none."""
+    """The default `slower_period`: the model has no rocking to average over."""
     return zeros(columns) + np.inf
 
 
@@ -103,20 +104,20 @@ class Tier:
     summary: str
     """One line for the documentation."""
     parameters: tuple[str, ...] = ()
-    """Names of the physical parameters that it depends on; `sweep.parameters` has their meanings."""
+    """Names of the physical parameters that it depends on; `sweep.parameters` explains them."""
     offers: frozenset[str]
-    """What can be asked of it, out of the names above, such as `COUNT`."""
+    """What it offers, a selection of the names above, such as `COUNT`."""
     positive: frozenset[str] = frozenset()
     """Parameters that must not be zero, although `sweep.parameters` allows it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Model(Tier):
-    """A rung that is simulated: its equations of motion, and what else is known of it, which may be left out.
+    """A rung that is simulated: its equations of motion, and optional further knowledge about it.
 
     The functions called "inline" are marked `sweep.jit.inline`.  They become part of the kernel, where they work on
     the scalars of one trajectory.  Called from Python they also take arrays, real or complex, so that energies and
-    Jacobians are computed with the very same code.  They consist of plain arithmetic, without branches or loops, so
+    Jacobians come from the very same code.  They consist of plain arithmetic, without branches or loops, so
     that the loop over lanes can be vectorised.
     """
 
@@ -139,7 +140,7 @@ class Model(Tier):
     small the rattle is: no difference of numbers of order one may be taken."""
     tilt: Callable[..., Any] = nothing
     """Inline, (states) -> sin² of the angle by which the body is tilted from upright spin.  The variables of a model
-    that has it end at a right angle, where the body has toppled; by default the equations know of none."""
+    with this function end at a right angle, where the body has toppled; by default there is no such limit."""
     impossible: Callable[[Columns], Array] = lambda columns: zeros(columns).astype(bool)
     """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
     function is called for such a body."""
@@ -166,20 +167,20 @@ class Model(Tier):
     ripple: Ripple = NO_RIPPLE
     """How the spin ripples with the rattle, for the ripple-free spin whose changes of sign are counted."""
 
-    # When a trajectory may end because its spin can reverse no more, beside what the linear theory tells.
+    # When a trajectory may end because its spin can reverse no more, apart from the linear theory.
     decided: Callable[..., Any] = never_decided
     """Inline, (states, constants) -> whether the spin can reverse no more, so that the trajectory settles, whatever the
-    linear theory says; by default it leaves no instruction.  It is asked at every look."""
+    linear theory says; by default it adds no instruction.  It is evaluated at every look."""
     faint: str = ""
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""
 
-    # What trajectories and labels show of it, and in which units.
+    # What trajectories and labels show, and in which units.
     observe: Callable[[Array, Any], dict[str, Array]] = lambda y, p: {}
     """(states, of shape (states, samples); constants, each of shape (samples,)) -> the series that a single trajectory
-    shows beside spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
+    shows besides spin and energy, by names that `sweep.studies.trajectory` or `series` explains."""
     series: tuple[tuple[str, str, str], ...] = ()
-    """Name, CF unit and meaning of what only this model can `observe`."""
+    """Name, CF unit and meaning of each series that only this model can `observe`."""
     turned: Callable[[Columns], Array] = zeros
     """(columns) -> angle from the axes of the states to x and y, along which a trajectory shows vectors, of shape
     (cells,)."""
@@ -191,16 +192,16 @@ class Model(Tier):
     """(columns) -> sqrt(g/c) in the model's own units, shape (cells,): by default the unit itself.  Tolerances and the
     largest spin that the linear theory looks at are in sqrt(g/c), whatever the units are."""
     units: str = OWN
-    """What the numbers of a model that a user brings are in, for the labels: "paper", "SI" or "own"."""
+    """Units of a user's model, for the labels: "paper", "SI" or "own"."""
 
     variant: Any = None
-    """What a variant for any body is made of, its `sweep.models.general.common.Variant`; None for other models."""
+    """The `sweep.models.general.common.Variant` behind a variant for any body; None for other models."""
 
-    # What a user brings with it.
+    # Additions for a user's model.
     own_parameters: tuple[Parameter, ...] = ()
-    """Parameters that are not in `sweep.parameters`, of a model that a user brings."""
+    """Parameters of a user's model that are not in `sweep.parameters`."""
     origin: Origin | None = None
-    """Where the model comes from, if a user brings it."""
+    """The origin of a user's model; None for a model of the package."""
 
     @property
     def slows(self) -> bool:
@@ -209,20 +210,20 @@ class Model(Tier):
 
     @property
     def key(self) -> str:
-        """Name its compiled code, apart from that of other models."""
+        """The name of its compiled code, which differs from that of every other model."""
         return f"{self.name}@{self.origin.digest}" if self.origin else self.name
 
 
 def named(*fields: str):
-    """A base for the constants of a model whose fields are put together from several lists, a `NamedTuple` class."""
+    """A base for constants whose fields are put together from several lists: a `NamedTuple` class."""
     return namedtuple("Constants", fields)
 
 
 def take(record: Any, cells: Any) -> Any:
-    """Of a record of arrays, such as constants, those of the cells with the indices `cells`: one of the same type."""
+    """Select the cells with the indices `cells` from a record of arrays, such as constants; the type stays the same."""
     return type(record)(*(values[cells] for values in record))
 
 
 def stack(columns: tuple[Array, ...]) -> Array:
-    """Arrays or numbers as the rows of one array, broadcast against each other."""
+    """Stack arrays or numbers as the rows of one array, broadcast against each other."""
     return np.stack(np.broadcast_arrays(*columns))

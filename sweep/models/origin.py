@@ -1,6 +1,6 @@
-"""Where a model that a user brings comes from.
+"""The origin of a user's model.
 
-A model of this package has no origin: it is one of its sources.
+A model of this package has no origin: it is part of the package's sources.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ class Origin:
     """A file, or an entry point of a package.  Plain data, so that other processes can load the very same code."""
 
     name: str
-    """As the configuration names it."""
+    """Its name in the configuration."""
     place: str
-    """Path of the file, for messages; of an entry point "package.module:MODEL"."""
+    """Path of the file, for messages; "package.module:MODEL" for an entry point."""
     text: str
-    """What the file says, which is what runs wherever it is loaded; "" for an entry point."""
+    """Text of the file, which runs wherever the model is loaded; "" for an entry point."""
     digest: str
     """SHA-256 of the file, or of all Python files of the entry point's package."""
 

@@ -1,8 +1,8 @@
-"""Specialises the equations for a scene: what is zero or one there leaves no instruction.
+"""Specialise the equations for a scene: whatever is zero or one there adds no instruction.
 
 Functions of a model consist of plain arithmetic without branches (`sweep.models.model.Model`).  Called once with
 symbols in place of numbers, they write down what they compute, and numbers that are known fold away: 0·x, 1·x, x + 0.
-What is left becomes the source of one function.  A compiler of floating-point code cannot do that by itself, because
+The rest becomes the source of one function.  A compiler of floating-point code cannot do that by itself, because
 0·x is not zero for an infinite x.
 """
 
@@ -38,7 +38,7 @@ _SOURCES: dict[Any, str] = {
 
 
 class Trace:
-    """What has been computed so far, each expression once, in the order of the source."""
+    """The expressions computed so far, each once, in the order of the source."""
 
     def __init__(self) -> None:
         self.nodes: dict[tuple[Any, ...], Symbol] = {}
@@ -50,7 +50,7 @@ class Trace:
         return self.nodes.setdefault(key, Symbol(self, template, inputs))
 
     def lines(self, results: list[Any]) -> tuple[list[str], dict[int, str]]:
-        """The source of what `results` need, and the names in it, by the identity of a symbol."""
+        """The source that computes `results`, and the names in it, by the identity of a symbol."""
         needed, stack = set[int](), [each for each in results if isinstance(each, Symbol)]
         while stack:
             each = stack.pop()
@@ -74,7 +74,7 @@ def source_of(each: Any, names: dict[int, str]) -> str:
 
 
 class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
-    """A number of which only the source is known."""
+    """A number that is known only by its source."""
 
     def __init__(self, trace: Trace, template: str, inputs: tuple[Any, ...]) -> None:
         self.trace, self.template, self.inputs = trace, template, inputs
@@ -100,7 +100,7 @@ def power(base: Any, exponent: int) -> Any:
 
 
 def folded(ufunc: Any, *inputs: Any) -> Any:
-    """What an operation gives without computing anything, or None."""
+    """The result of an operation that needs no computation, or None."""
     zero, one = ([not isinstance(each, Symbol) and each == number for each in inputs] for number in (0, 1))
     if ufunc is np.multiply:
         return 0.0 if any(zero) else inputs[1] if one[0] else inputs[0] if one[1] else None
@@ -120,9 +120,9 @@ def choose(condition: str, a: Any, b: Any, yes: Any, no: Any) -> Any:
 
 
 def call(function: Any, name: str, values: int, *inputs: Any) -> Any:
-    """`function` of symbols and the constants p, as one expression that is not looked into.
+    """`function` of symbols and the constants p, as one expression that is not traced further.
 
-    `values` is the number of values that it returns as a tuple, 0 for one that is none.
+    `values` is the number of values in the tuple that it returns, 0 if it returns a single number.
     """
     trace = next(each.trace for each in inputs if isinstance(each, Symbol))
     trace.names[name] = function
@@ -141,19 +141,19 @@ class Constants:
         return self.of(trace.node(f"p.{name}") for name in self.names)
 
     def of(self, values: Iterable[Any]) -> SimpleNamespace:
-        """All of them, of which the `names` have these values."""
+        """All constants; those in `names` have these values."""
         return SimpleNamespace(**self.known, **dict(zip(self.names, values, strict=True)))
 
 
 def specialised(function: Callable[..., Any], **arguments: Any):
-    """`function` as straight-line source, inline.
+    """Write `function` as straight-line source, inline.
 
     Parameters
     ----------
     arguments : for each argument of `function` in their order: None for a number, a count for a tuple of numbers, a
         `NamedTuple` class for one of those, and `Constants` for p, the last
 
-    Where Numba is told not to compile, it is `function` itself, in which a debugger stops.
+    If compilation by Numba is disabled, return `function` itself, in which a debugger can stop.
     """
     if INTERPRETED:
         return _interpreted(function, arguments["p"])

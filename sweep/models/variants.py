@@ -1,8 +1,8 @@
-"""Chooses the variant of `slip` or `noslip` for a body and a law of friction.
+"""Choose the variant of `slip` or `noslip` for a body and a law of friction.
 
 A *variant* is specialised for one law, and for the couples, extras (`sweep.models.general.common.EXTRAS`) and surface
-that its name lists: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, `slip+viscous+offset+gravity`.  What it does not
-name leaves no instruction in its kernel.  The variant of the paper's body is `slip` itself.
+that its name lists: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, `slip+viscous+offset+gravity`.  Whatever it does
+not name adds no instruction to its kernel.  The variant of the paper's body is `slip` itself.
 
 The `Physics` of a configuration chooses the variant that runs it.
 """
@@ -33,21 +33,21 @@ INERTIA = (*rigid_body.MOMENTS, *rigid_body.PRODUCTS)
 
 @dataclass(frozen=True)
 class SlipWith:
-    """The variants of `slip` with a law of friction that a user brings: what `with_law` makes."""
+    """The variants of `slip` with a user's law of friction, as `with_law` makes them."""
 
     law: Law
     own_parameters: tuple[Parameter, ...]
-    """Those of the law's parameters that are not in `sweep.parameters`, or mean something else there."""
+    """The law's parameters that are not in `sweep.parameters`, or have another meaning there."""
     origin: Origin | None = None
 
 
 def with_law(law: Law, *parameters: Parameter) -> SlipWith:
-    """The MODEL of a file that brings a law of friction for any body.
+    """Make the MODEL of a file that defines a law of friction for any body.
 
     Parameters
     ----------
     law : its resistance takes the constants that `law.parameters` names
-    parameters : records of those that are not in `sweep.parameters`, all of the section "friction"
+    parameters : records of its parameters that are not in `sweep.parameters`, all in the section "friction"
     """
     return SlipWith(law, parameters)
 
@@ -56,14 +56,14 @@ def with_law(law: Law, *parameters: Parameter) -> SlipWith:
 def make(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
     """The model of a variant.
 
-    Its `parameters` are those of the body and the start that it is asked to depend on; they make no difference to its
+    Its `parameters` are those of the body and the start on which it should depend; they make no difference to its
     kernel.
     """
     return slipping(variant, parameters) if variant.law else rolling(variant, parameters)
 
 
 def variant(name: str, own: Law | None = None) -> Model:
-    """The model of a name, such as `slip+coulomb-tanh+sigma`; `own` is the law that it names if a user brings one.
+    """The model of a name, such as `slip+coulomb-tanh+sigma`; `own` is a user's law that the name refers to.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def variant(name: str, own: Law | None = None) -> Model:
 
 @dataclass(frozen=True)
 class Physics:
-    """The physics that a configuration describes, beside its numbers: of bodies, friction and starts."""
+    """The physics that a configuration describes, apart from its numbers: bodies, friction and starts."""
 
     units: str
     """`PAPER_UNITS` or `SI`."""
@@ -94,7 +94,7 @@ class Physics:
 
     @property
     def beyond(self) -> list[str]:
-        """List what the paper's models do not know of it."""
+        """List the parts that the paper's models do not cover."""
         found = sorted(self.names - PAPER_PARAMETERS.keys())
         found += [f"law: {self.law.name}"] if self.law.name != PAPER_LAW else []
         found += [f"units: {self.units}"] if self.units != PAPER_UNITS else []
@@ -102,12 +102,12 @@ class Physics:
 
     @property
     def required(self) -> frozenset[Parameter]:
-        """The parameters that have to be given, because their defaults are of other bodies."""
+        """The parameters that have to be given, because their defaults apply to other bodies."""
         names = PAPER_PARAMETERS if self.units == SI else self.surface.required
         return frozenset(PARAMETERS[name] for name in names)
 
     def variant(self, base: str) -> Model:
-        """The variant of `slip` or `noslip` for it, whose parameters are those that follow from what is named."""
+        """The variant of `slip` or `noslip` for it, with the parameters that follow from the named ones."""
         homogeneous = self.surface.homogeneous and not self.names & {*INERTIA}
         moments = ("delta",) if homogeneous else INERTIA
         system = SI_ALONE if self.units == SI else ()
@@ -121,13 +121,13 @@ class Physics:
         return make(Variant(self.law if base == "slip" else None, couples, self.surface, extras), parameters)
 
     def misfits(self) -> dict[str, str]:
-        """List the named parameters that do not go with the rest, and what to do about each."""
+        """List the named parameters that are incompatible with the rest, and what to do about each."""
         inertia, angles = self.names & {*INERTIA}, self.names & {*starts.ANGLES, *starts.SLIP}
         found: dict[str, str] = {}
         if inertia:
             found["delta"] = f"cannot be combined with {_some(inertia)}; leave out either"
         elif not self.surface.homogeneous:
-            found["delta"] = f"means nothing with surface: {self.surface.name}; give the elements of inertia instead"
+            found["delta"] = f"has no meaning with surface: {self.surface.name}; give the elements of inertia instead"
         if angles:
             ways = f"either {', '.join(starts.POINT)} or angles, omega1 … omega3 and slip"
             found |= dict.fromkeys(starts.POINT, f"cannot be combined with {_some(angles)}; give {ways}")
@@ -135,7 +135,7 @@ class Physics:
             found |= dict.fromkeys(SI_ALONE, "is 1 in the paper's units; leave it out, or set units: SI")
         known = {*self.law.parameters, "mu"}  # one file with mu serves every law
         takes = ", ".join((*self.law.parameters, *(name for couple in COUPLES.values() for name in couple.parameters)))
-        # In the order of the laws: that of a set would change from process to process.
+        # In the order of the laws: the order of a set would change from process to process.
         for name in dict.fromkeys(name for law in LAWS.values() for name in law.parameters):
             if name not in known:
                 found[name] = f"does not belong to the law {self.law.name}; leave it out (friction takes {takes})"

@@ -1,7 +1,7 @@
-"""Vectors of three components, and symmetric matrices: equations are written with them as books do.
+"""Vectors of three components and symmetric matrices, so that equations look as they do in books.
 
-Only what is traced (`sweep.models.symbols`) or called from Python uses them.  Components are numbers, arrays or
-symbols.
+Only functions that are traced (`sweep.models.symbols`) or called from Python use them.  Components are numbers, arrays
+or symbols.
 """
 
 from __future__ import annotations

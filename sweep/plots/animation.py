@@ -24,7 +24,7 @@ from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
 MOST = 6
-"""Bodies shown side by side, at most."""
+"""Largest number of bodies shown side by side."""
 
 SECONDS = 10.0
 """Duration of a clip whose speed is not given."""
@@ -32,7 +32,7 @@ SECONDS = 10.0
 FRAMES_A_SECOND = 20
 
 _BEYOND = 2.0
-"""End of a clip, relative to the latest first reversal of its bodies, which so lies in the middle."""
+"""End of a clip, relative to the latest first reversal of its bodies, which is thus in the middle."""
 
 _BUTTONS = {
     "minus": "−", "fast-backward": "⏮", "step-backward": "⏪", "play fa-flip-horizontal": "◀", "pause": "⏸",
@@ -56,18 +56,18 @@ def animate(
         check(path)
     if speed is not None and not speed > 0:
         raise fault_of(f"{speed:g}; give a number above zero", "speed")
-    found = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
-    if not body.drawable(found):
+    shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
+    if not body.drawable(shown):
         raise fault_of("its bodies have no attitude, or no a, b and c; animate trajectories of slip or noslip")
-    if (bodies := found.sizes["trajectory"]) > MOST:
+    if (bodies := shown.sizes["trajectory"]) > MOST:
         raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}")
-    last = float(found["time"][-1])
-    end = min(_until(found) if end is None else end, last)
+    last = float(shown["time"][-1])
+    end = min(_until(shown) if end is None else end, last)
     if not begin < end:
         raise fault_of(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
     seconds = SECONDS if speed is None else (end - begin) / speed
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
-    scene = _Scene(found, np.linspace(begin, end, count))
+    scene = _Scene(shown, np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:
         _save(animation, path)
@@ -105,13 +105,19 @@ class _Scene:
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
         zero_line(over_time)
+        ones = [dataset.isel(trajectory=i) for i in range(bodies)]
+        moving = [body.moving(one, times) for one in ones]
+        half = max(each.reach for each in moving)  # one scale for all
         self.bodies = []
-        for i in range(bodies):
+        for i, (one, each) in enumerate(zip(ones, moving, strict=True)):
             place = (i / bodies, 0.42, 1 / bodies, 0.55)
             axes: Any = self.figure.add_axes(place, projection="3d", computed_zorder=False)
             axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.8)
+            each.look(axes, half)
+            for line in each.table(half):
+                axes.plot(*line, color="0.85", linewidth=0.6, zorder=0)
             (curve,) = over_time.plot([], [], color=f"C{i}", linewidth=1)
-            self.bodies.append(_Body(dataset.isel(trajectory=i), times, axes, curve))
+            self.bodies.append(_Body(one, each, times, axes, curve))
         spins = np.append(np.concatenate([each.spin for each in self.bodies]), 0.0)
         margin = 0.08 * max(np.ptp(spins), 1e-12)
         over_time.set_ylim(spins.min() - margin, spins.max() + margin)
@@ -126,14 +132,10 @@ class _Scene:
 class _Body:
     """One body on its table, and its curve of n(t)."""
 
-    def __init__(self, one: xr.Dataset, times: Array, axes: Any, curve: Line2D) -> None:
-        self.axes, self.curve, self.times = axes, curve, times
-        self.moving = body.moving(one, times)
+    def __init__(self, one: xr.Dataset, moving: body.Moving, times: Array, axes: Any, curve: Line2D) -> None:
+        self.axes, self.curve, self.times, self.moving = axes, curve, times, moving
         known = np.isfinite(one["heading"].values)
         self.spin = np.interp(times, one["time"].values[known], one["spin"].values[known])
-        self.moving.look(axes)
-        for line in self.moving.table:
-            axes.plot(*line, color="0.85", linewidth=0.6, zorder=0)
         # Seen through the body, which covers most of it.
         (self.trace,) = axes.plot([], [], [], color="black", linewidth=1, zorder=3)
         (self.dot,) = axes.plot([], [], [], "o", color="black", markersize=3, zorder=3)

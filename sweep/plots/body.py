@@ -40,22 +40,24 @@ class Moving:
     """The contact point on the table, shape (2, times)."""
 
     @property
-    def box(self) -> tuple[Array, float]:
-        """The middle of the table, shape (2,), and half its side."""
-        reach = 0.72 * np.abs(self.points).max() + np.ptp(self.path, axis=1).max() / 2
-        return (self.path.max(1) + self.path.min(1)) / 2, float(reach)
+    def reach(self) -> float:
+        """Half the side of the smallest table with room for the body on its path."""
+        return float(0.72 * np.abs(self.points).max() + np.ptp(self.path, axis=1).max() / 2)
 
     @property
-    def table(self) -> list[Array]:
-        """The ends of the lines on the table, each of shape (3, 2)."""
-        middle, half = self.box
+    def _middle(self) -> Array:
+        return np.asarray((self.path.max(1) + self.path.min(1)) / 2)
+
+    def table(self, half: float) -> list[Array]:
+        """The ends of the lines on a table of side 2 `half` around the path, each of shape (3, 2)."""
         ticks = np.linspace(-half, half, _LINES)
         lines = [np.array([ticks[[0, -1]], [tick, tick]]) for tick in ticks]
-        return [np.append(each + middle[:, None], [[0, 0]], axis=0) for line in lines for each in (line, line[::-1])]
+        middle = self._middle[:, None]
+        return [np.append(each + middle, [[0, 0]], axis=0) for line in lines for each in (line, line[::-1])]
 
-    def look(self, axes: Any) -> None:
-        """Let three-dimensional axes of matplotlib show the whole table, in perspective."""
-        middle, half = self.box
+    def look(self, axes: Any, half: float) -> None:
+        """Let three-dimensional axes of matplotlib show that whole table, in perspective."""
+        middle = self._middle
         axes.set(xlim=middle[0] + [-half, half], ylim=middle[1] + [-half, half], zlim=(0, half))
         axes.set_box_aspect((2, 2, 1), zoom=1.3)
         axes.set_proj_type("persp", focal_length=0.7)
@@ -106,7 +108,7 @@ def _points(ellipsoid: bool, columns: dict[str, Array]) -> Array:
         depth = 1 - bowl**2
     if below:
         bowl, depth = np.append(bowl, lid), np.append(depth, 0 * lid)
-    azimuth = np.linspace(2 * np.pi, 0, 33)  # so that the sides that are lit are those outside
+    azimuth = np.linspace(2 * np.pi, 0, 33)  # so that the outer sides are lit
     x, y = a * np.outer(bowl, np.cos(azimuth)), b * np.outer(bowl, np.sin(azimuth))
     return np.stack([x, y, np.broadcast_to(c * depth[:, None] - below, x.shape)])
 

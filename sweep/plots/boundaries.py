@@ -68,13 +68,13 @@ def curves(dataset: xr.Dataset, x: str, y: str) -> Iterator[tuple[int, Array, Ar
 
 
 def _axis(dataset: xr.Dataset, name: str) -> Axis:
-    """An axis as long as the searched one, and spaced like it."""
+    """Return an axis with the ends and the spacing of the searched one."""
     ends = np.asarray(dataset[name].attrs["actual_range"], float)
     return Axis(name, np.geomspace(ends[0], ends[1], 3) if dataset[name].attrs["spacing"] == "log" else ends)
 
 
 def _panels(dataset: xr.Dataset, across: set[str]) -> Iterator[tuple[str, xr.Dataset]]:
-    """The values of the other axes in words, and the points that have them."""
+    """Yield the values of the other axes in words, and the points that have them."""
     others = [str(n) for n, c in dataset.coords.items() if c.dims == ("point",) and n not in across]
     columns = [dataset[name].values for name in others] or [np.zeros(dataset.sizes["point"])]
     cells = np.stack(columns, axis=1)

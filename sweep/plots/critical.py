@@ -19,8 +19,8 @@ from sweep.plots.panels import MAX_PANELS, check, indices
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
 
 _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
-    "": ("formula of Takano (2011)", {"linestyle": "--"}),
-    "_linear": ("eigenvalues of the model", {"linestyle": "-"}),
+    "": ("formula", {"linestyle": "--"}),
+    "_linear": ("eigenvalues", {"linestyle": "-"}),
     "_simulated": ("simulation", {"linestyle": "none", "marker": "x", "markersize": 4}),
 }
 """Sources of a critical spin, by the suffix of its variable: their words and styles."""
@@ -49,14 +49,14 @@ def draw(dataset: xr.Dataset) -> Picture:
                 # Rows of a table have no values in between.
                 values, places = between[variable], between[variable][x].values
             if len(places) == 1 and "marker" not in styles[variable]:
-                places = Axis(x, at).edges  # a line of one point would not be seen
+                places = Axis(x, at).edges  # a line of one point would be invisible
             axes.plot(places, np.broadcast_to(values.values, places.shape), gid=variable, **styles[variable])
         zero_line(axes)
         axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
         if not there:
             write_words(axes, _why_none(chosen))
         axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
-    names = {f"{name}: {theory.WORDS[name]} where |n| is larger": colour for name, colour in _COLOURS.items()
+    names = {f"{theory.WORDS[name]} beyond {name}": colour for name, colour in _COLOURS.items()
              if any(variable.startswith(name) for variable in shown)}  # fmt: skip
     sources = [drawn for suffix, drawn in _SOURCES.items()
                if shown & {f"{name}_{side}{suffix}" for name in _COLOURS for side in ("plus", "minus")}]  # fmt: skip

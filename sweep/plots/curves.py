@@ -34,7 +34,7 @@ _STYLES: dict[str, dict[str, Any]] = {
 """Markers of variables, and of the kinds of cell, drawn around those of the first variable."""
 
 _ROOM = 6.0
-"""Points along the axis for each mark of full size."""
+"""Points of the axis per mark of full size."""
 
 _BELOW = 0.03
 """Room below zero, relative to that above."""
@@ -88,7 +88,7 @@ def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str, kinds: dict
 
 
 def _values(axes: Axes, chosen: xr.Dataset, described: list[Map], kinds: dict[str, str]) -> None:
-    """Write the values of a single cell: one point is no chart."""
+    """Write the values of a single cell, since one point does not make a chart."""
     lines = []
     for shown in described:
         at = shown.values.item()

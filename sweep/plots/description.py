@@ -26,7 +26,7 @@ MARGINS = ("reversals", "margin_more", "margin_fewer", "status")
 
 @dataclass(frozen=True)
 class Map:
-    """A variable over two axes, all other axes being fixed."""
+    """A variable over two axes; all other axes are fixed."""
 
     name: str
     x: Axis
@@ -55,11 +55,11 @@ class Map:
 
 
 def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
-    """The map of a variable, or its one row.
+    """Describe the map of a variable, or its single row.
 
     Parameters
     ----------
-    dataset : in which all axes but `x` and `y` are fixed, and the values of these are in increasing order
+    dataset : all axes but `x` and `y` are fixed, and the values of these are in increasing order
     name : as `sweep.plots.quantities.field` takes it
     x, y : empty where there is no such axis
     """
@@ -78,7 +78,7 @@ def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     if not set(MARGINS) <= set(dataset.data_vars):
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
-    words = "boundary where this reversal count begins (estimated)"
+    words = "boundary of counts"
     curves = {level: list(contours(counts.distance(level), x, y, corners=True)) for level in counts.levels()}
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 
@@ -91,7 +91,7 @@ def along(dataset: xr.Dataset, dim: str) -> Array:
 
 
 def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:
-    """An array as a table of shape (y, x), along whichever of the two axes it does not vary."""
+    """An array as a table of shape (y, x), repeated along an axis on which it does not vary."""
     sizes = {y.name or "_y": len(y.values), x.name or "_x": len(x.values)}
     template = xr.DataArray(np.zeros(list(sizes.values()), bool), dims=list(sizes))
     return np.ascontiguousarray(array.drop_vars(array.coords).broadcast_like(template).transpose(*sizes).values)

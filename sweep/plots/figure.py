@@ -1,4 +1,4 @@
-"""A figure of matplotlib: how it is shown and laid out, its axes, and its legend below."""
+"""A figure of matplotlib: its style and layout, its axes, and its legend below."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RATIO = 0.78
 """Height of a map relative to its width."""
 
 _WIDE, _SHAPE = 15.2, 2.0
-"""Inches across of a page that no user has asked for, and its width relative to its height."""
+"""Width in inches of a page whose size the user has not set, and its width relative to its height."""
 
 _STYLE: dict[Any, Any] = {
     "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
@@ -44,22 +44,22 @@ _STYLE: dict[Any, Any] = {
     "axes.formatter.limits": [-4, 6], "axes.formatter.use_mathtext": True,
     "figure.dpi": 110, "pdf.fonttype": 42, "ps.fonttype": 42, "svg.hashsalt": "sweep",
 }  # fmt: skip
-"""Settings of matplotlib, where the user has none of his own."""
+"""Settings of matplotlib that the user has not changed."""
 
 _PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
 """Settings for print that replace these, so that no text is too small."""
 
-_LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.75, 0.17, 4
-"""Inches that a letter, the rest of an entry and a line take in a legend, and lines for which figures have room."""
+_LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.55, 0.17, 4
+"""Inches per letter, entry and line of a legend, and the number of lines for which figures have room."""
 
 _OF_TITLE = 0.09
-"""Inches of a letter of a title, at most."""
+"""Largest width in inches of a letter of a title."""
 
 _OF_LABEL = 0.085
-"""Inches of a letter of a label of an axis, with some room, since axes are laid out later."""
+"""Inches per letter in the label of an axis, with some room, since axes are laid out later."""
 
 _OF_CONSTANTS, _LONGEST = 1 / 13, 90
-"""Inches of a letter of the constant parameters, and most letters in a line of them."""
+"""Inches per letter of the constant parameters, and the largest number of letters in a line."""
 
 _UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
 """Patterns kept on one line: the unit at the end of a label, a value; a constant with its unit."""
@@ -68,16 +68,16 @@ _HIGHER = (1.25, 1.6, 2.0, 2.5)
 """Factors by which a figure of given width may become higher."""
 
 _SPARE = 0.97
-"""Share of a size that must suffice, because the layout differs a little from one drawing to the next."""
+"""Share of the size that must be enough, because the layout differs slightly from one drawing to the next."""
 
 _LEAST = 1.2
-"""Inches of a map across, at least."""
+"""Smallest width of a map in inches."""
 
 _COLUMN, _OF_COLUMN = 6.0, 3
-"""Inches across of a page up to which it is a column of text, and panels in a row there, at most."""
+"""Largest width in inches of a column of text, and the largest number of panels in a row there."""
 
 _NARROWEST = 0.1
-"""Inches across of a panel on a page without room, which is refused once it is drawn."""
+"""Width in inches of a panel on a page without room; the figure is refused after drawing."""
 
 
 def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
@@ -85,24 +85,24 @@ def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
 
     Parameters
     ----------
-    width : inches of the figure; None for as the user has set it, or for a screen
+    width : width of the figure in inches; None for the user's setting, or for a screen
     printed : whether it is for print
     """
     ours = _STYLE | (_PRINT if printed else {})
-    found = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
+    unchanged = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
     # The panels set the height; this one only keeps the size from being taken for matplotlib's default.
-    return found | ({"figure.figsize": [width, width / 2]} if width else {})
+    return unchanged | ({"figure.figsize": [width, width / 2]} if width else {})
 
 
 class Picture(Figure):
-    """A figure that is shown as the value of a notebook's cell, also where pyplot has drawn nothing yet.
+    """A figure that a notebook shows as the value of a cell, even before pyplot has drawn anything.
 
     Before that, IPython has no way to show a figure of matplotlib, and prints its name.  It keeps the style in which it
     was made: matplotlib makes ticks and looks up fonts only when it draws.
 
     Parameters
     ----------
-    width, height : in inches beside a text of `TEXT` points
+    width, height : in inches, for text of `TEXT` points
     """
 
     def __init__(self, width: float, height: float) -> None:
@@ -126,13 +126,13 @@ class Picture(Figure):
         return stream.getvalue()
 
     def head(self, title: str, constants: str) -> None:
-        """A title, and the constant parameters, which stand over the legend."""
+        """Set the title, and the constant parameters, which are written above the legend."""
         self._constants = constants_in_lines(constants, self._width)
         if title:
             self.suptitle(fill(title, max(1, int(self._width / _OF_TITLE))))
 
     def panels(self, rows: int, columns: int, count: int, **shared: Any) -> list[Axes]:
-        """Axes side by side and below each other, of which the last row may have fewer."""
+        """Make a grid of axes, whose last row may have fewer."""
         grid = self.subplots(rows, columns, squeeze=False, **shared).ravel()
         for axes in grid[count:]:
             axes.remove()
@@ -140,7 +140,7 @@ class Picture(Figure):
 
     @property
     def _panels(self) -> list[Axes]:
-        """All axes but bars and second axes, which have labels."""
+        """All axes except bars and second axes, which have labels."""
         return [axes for axes in self.axes if not axes.get_label()]
 
     def explain(self, handles: Sequence[Artist]) -> None:
@@ -150,14 +150,14 @@ class Picture(Figure):
             return
         room = max(1, int((self._width - _HANDLE) / _LETTER))
         words = [fill(str(handle.get_label()), room, break_long_words=False) for handle in handles]
-        longest = max((len(line) for each in words for line in each.split("\n")), default=0)
-        columns = min(max(1, int(self._width / (longest * _LETTER + _HANDLE))), max(len(words), 1))
+        columns = _columns(words, self._width)
         self.legend(
             list(handles), [labels.in_maths(each) for each in words], loc="outside lower center", frameon=False,
-            handlelength=3, ncols=columns, title=self._constants or None,
-            alignment="left" if columns == 1 else "center",
+            handlelength=2.5, columnspacing=1.3, ncols=len(columns), title=self._constants or None,
+            alignment="left" if len(columns) == 1 else "center",
         )  # fmt: skip
-        lines = sum(each.count("\n") + 1 for each in words) / columns + self._constants.count("\n") + 1
+        lines = max(sum(each.count("\n") + 1 for each in column) for column in columns)
+        lines += self._constants.count("\n") + 1
         more = max(0, lines - _LINES) * _LINE
         self.set_figheight(self.get_figheight() * (1 + more / self._height))
 
@@ -182,7 +182,7 @@ class Picture(Figure):
             return False
         if self._holds(wide, high):
             return True
-        # What has no room in the highest figure has none in a lower one.
+        # If the highest figure has no room, a lower one has none either.
         if not taller or not self._holds(wide, _HIGHER[-1] * high):
             return False
         return any(self._holds(wide, factor * high) for factor in _HIGHER)
@@ -200,14 +200,24 @@ class Picture(Figure):
         return True
 
 
+def _columns(entries: list[str], width: float) -> list[list[str]]:
+    """Share the entries of a legend among as many columns as fit in this width in inches, as matplotlib does."""
+    for count in range(len(entries), 0, -1):
+        columns = [list(map(str, column)) for column in np.array_split(entries, count)]
+        longest = [max(len(line) for entry in column for line in entry.split("\n")) for column in columns]
+        if sum(longest) * _LETTER + count * _HANDLE <= width:
+            return columns
+    return [entries]
+
+
 def opaque(figure: Figure) -> None:
-    """Mix all transparent colours with the ground, for a format without transparency."""
+    """Mix all transparent colours with the background, for a format without transparency."""
     figure.draw_without_rendering()  # which makes the ticks
     ground = np.array(to_rgb(figure.get_facecolor()))
 
     def mixed(colours: Any) -> Array:
         rgba = to_rgba_array(colours)
-        alpha = np.where(rgba[:, 3:] > 0, rgba[:, 3:], 1.0)  # what is not drawn at all stays so
+        alpha = np.where(rgba[:, 3:] > 0, rgba[:, 3:], 1.0)  # invisible parts stay invisible
         return np.hstack([alpha * rgba[:, :3] + (1 - alpha) * ground, np.ceil(rgba[:, 3:])])
 
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
@@ -218,19 +228,19 @@ def opaque(figure: Figure) -> None:
         if isinstance(found, Line2D):
             colour = mixed(to_rgba(found.get_color(), found.get_alpha()))[0]
             found.set(alpha=None, color=colour)
-        elif getattr(found, "get_array", lambda: None)() is None:  # not what a colour map colours
+        elif getattr(found, "get_array", lambda: None)() is None:  # except parts coloured by a colour map
             one = isinstance(found, Patch)
             face, edge = (mixed(each) for each in (found.get_facecolor(), found.get_edgecolor()))
             found.set(alpha=None, facecolor=face[0] if one else face, edgecolor=edge[0] if one else edge)
 
 
 def constants_in_lines(constants: str, width: float) -> str:
-    """The constant parameters in lines, for a figure of so many inches."""
+    """Wrap the constant parameters into lines, for a figure of this width in inches."""
     return _wrapped(constants, min(_LONGEST, int(width / _OF_CONSTANTS)), _PARAMETER)
 
 
 def _wrapped(words: str, room: int, whole: str) -> str:
-    """Break words into lines of so many letters, but nowhere within what the pattern `whole` matches."""
+    """Break words into lines of at most `room` letters, but never within a match of the pattern `whole`."""
     space = "\N{NO-BREAK SPACE}"
     joined = re.sub(whole, lambda match: match[0].replace(" ", space), words)
     lines = [fill(line, max(room, 1), break_long_words=False, break_on_hyphens=False) for line in joined.split("\n")]
@@ -248,7 +258,7 @@ def zero_line(axes: Axes) -> None:
 
 
 def page() -> float:
-    """Inches of a page across, beside a text of `TEXT` points: as the user wants it, or of a screen."""
+    """Return the width of a page in inches, for text of `TEXT` points: the user's setting, or that of a screen."""
     return float(mpl.rcParams["figure.figsize"][0] * TEXT / mpl.rcParams["font.size"]) if is_asked() else _WIDE
 
 
@@ -258,12 +268,12 @@ def is_asked() -> bool:
 
 
 def is_column() -> bool:
-    """Return whether the page is as narrow as a column of text, where a figure shows one thing alone."""
+    """Return whether the page is as narrow as a column of text, where a figure shows a single variable."""
     return page() <= _COLUMN
 
 
 def panel_width(columns: int, widest: float, around: float) -> float:
-    """Return the width of each of several panels in a row, in inches: a page of given size is filled.
+    """Return the width of each of several panels in a row, in inches, which fills a page of given size.
 
     Parameters
     ----------
@@ -281,7 +291,7 @@ Frames = list[tuple[Axes, xr.Dataset]]
 def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, Frames]:
     """Make a figure with axes over `x` for each panel of a dataset, paired with the part to draw there."""
     rows, columns = arrangement(len(panels), 1.5 if is_column() else 2)
-    high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell has words alone
+    high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell is written in words
     figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
     figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
     frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))

@@ -1,6 +1,6 @@
 """Critical spins between the cells of a map, by formulas and eigenvalues, so that their lines are smooth.
 
-From the dataset alone, and without any library that draws.
+This needs the dataset alone, and no plotting library.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from sweep.prediction import predict
 from sweep.results.configuration import configuration
 
 _POINTS = {1: 401, 2: 41}
-"""Values along one axis, and along each of two; the eigenvalues of a body take 0.1 ms."""
+"""Number of values along one axis, and along each of two; the eigenvalues of a body take 0.1 ms."""
 
 
 def critical_spins(dataset: xr.Dataset, *axes: Axis) -> Mapping[str, xr.DataArray]:
-    """The critical spins along the axes of a map or the one of curves, by the names that they have in a dataset.
+    """Compute the critical spins along the axes of a map, or along the axis of curves, by their names in a dataset.
 
-    They go from edge to edge of a map, and from the first to the last value of curves.  Each extends over those of the
-    axes on which the body depends.  There are none if a parameter of the body varies along another axis, and none if
+    They go from edge to edge of a map, and from the first to the last value of curves.  Each extends over the axes on
+    which the body depends.  There are none if a parameter of the body varies along another axis, and none if
     the dataset has no configuration, or one whose model is user-defined.
     """
     text = str(dataset.attrs.get("config", ""))
@@ -42,7 +42,7 @@ def critical_spins(dataset: xr.Dataset, *axes: Axis) -> Mapping[str, xr.DataArra
 
 
 def _between(axis: Axis, number: int, config: Config, *, whole: bool) -> Iterator[float]:
-    """Values along an axis, as far as the parameter may have them; of a whole map from edge to edge."""
+    """Values along an axis within the bounds of the parameter; for a map, from edge to edge."""
     first, last = axis.straight(axis.edges if whole else axis.values)[[0, -1]]
     for value in axis.bent(np.linspace(first, last, number)).tolist():
         if config.table[axis.name].allows(value) and (value > 0 or axis.name not in config.tier.positive):
@@ -61,15 +61,16 @@ def _config(text: str) -> Config | None:
 def _evaluated(
     text: str, axes: tuple[tuple[str, tuple[float, ...]], ...], fixed: tuple[tuple[str, float], ...]
 ) -> Mapping[str, xr.DataArray]:
-    """The critical spins over bodies, of the configuration with this text; kept, since panels and maps share them."""
+    """Compute the critical spins of the bodies in the configuration with this text; cached, since panels and maps share
+    them."""
     config = _config(text)
     assert config is not None
     # No critical spin depends on the start.
     starts = {name: value.numbers[0] for name, value in config.parameters.items() if name in START}
     grid = Grid({name: np.array(values) for name, values in axes}, {**starts, **dict(fixed)})
-    found = predict(config.tier, grid).variables
+    predicted = predict(config.tier, grid).variables
     return {
         name: xr.DataArray(values.reshape(grid.shape), grid.axes, grid.dims)
-        for name, values in found.items()
+        for name, values in predicted.items()
         if name.startswith("n_c")
     }

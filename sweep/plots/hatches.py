@@ -1,4 +1,4 @@
-"""Draw the kinds of cell of a map: hatches over results, plain grounds where there is no result, and dots."""
+"""Mark the kinds of cell on a map: hatches over results, plain colours for missing results, and dots."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ GROUNDS: dict[str, dict[str, Any]] = {
     "impossible": {"facecolor": "0.92", "edgecolor": "0.6", "hatch": "----"},
     "no_value": {"facecolor": "0.8", "edgecolor": "none"},
 }
-"""Grounds of the kinds of cell without a result, in no colour of any scale."""
+"""Colours of the kinds of cell without a result, which no scale uses."""
 
 HATCHES = {"time_limit": "////", "inferred": "..", "noise_limited": "||||"}
 
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "white", "markeredgecolor": "black"}
 
 _DOT_SIZE = 2.4
-"""Points across of a dot, which may be larger than its cell: smaller ones cannot be seen in print."""
+"""Size of a dot in points, which may exceed its cell: smaller ones cannot be seen in print."""
 
 _LIGHT, _DARK = (1.0, 1.0, 1.0, 0.7), (0.0, 0.0, 0.0, 0.55)
 """Hatches on dark and on light cells."""
@@ -63,7 +63,7 @@ def handle(kind: str, words: str) -> Artist:
 
 
 def _region(axes: Axes, where: Array, across: tuple[Array, Array], kind: str, **style: Any) -> None:
-    """All cells of a kind as one patch, so that its hatch goes on from cell to cell."""
+    """Draw all cells of a kind as one patch, so that its hatch continues from cell to cell."""
     if where.any():
         with mpl.rc_context({"hatch.linewidth": 0.7}):
             patch = PathPatch(outline(where, *across), linewidth=0, gid=kind, **style)

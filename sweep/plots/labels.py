@@ -39,12 +39,12 @@ def short(name: str) -> str:
 
 
 def label(dataset: xr.Dataset, name: str) -> str:
-    """The label of an axis: what it shows, and the unit."""
+    """The label of an axis: the quantity and its unit."""
     return with_unit(words(dataset, name), unit(dataset, name))
 
 
 def with_unit(words: str, unit: str) -> str:
-    """Words and a unit, or whichever of them there is."""
+    """Join words and a unit, either of which may be empty."""
     return f"{words} ({unit})" if words and unit else words or unit
 
 
@@ -109,19 +109,19 @@ def si_unit(dataset: xr.Dataset, name: str) -> str:
 def constants(dataset: xr.Dataset) -> str:
     """The parameters that are the same in the whole dataset, with their values.
 
-    Those of a rattleback that are zero unless they are named are left out where they are zero.
+    Parameters of a rattleback whose default is zero are left out where they are zero.
     """
-    found = {str(name): float(v) for name, v in dataset.coords.items() if v.ndim == 0 and v.dtype.kind in "fi"}
+    numbers = {str(name): float(v) for name, v in dataset.coords.items() if v.ndim == 0 and v.dtype.kind in "fi"}
     if not is_of_own_body(dataset):
-        found = {name: at for name, at in found.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
-    ordered = [name for name in parameters(dataset) if name in found]
-    fixed = [measured(dataset, name, found[name]) for name in dict.fromkeys([*ordered, *found])]
+        numbers = {name: at for name, at in numbers.items() if at or name not in PARAMETERS or PARAMETERS[name].default}
+    ordered = [name for name in parameters(dataset) if name in numbers]
+    fixed = [measured(dataset, name, numbers[name]) for name in dict.fromkeys([*ordered, *numbers])]
     known = {str(name): v.attrs["distribution"] for name, v in dataset.coords.items() if "distribution" in v.attrs}
     sampled = [f"{symbol(name)}: {words}{si_unit(dataset, name)}" for name, words in known.items()]
     return ", ".join([*fixed, *sampled])
 
 
 def in_maths(words: str) -> str:
-    """Words in which n_c1 and n_c1⁺ are set as symbols."""
+    """Set n_c1 and n_c1⁺ as symbols of mathematics."""
     signs = {"": "", "⁺": "^+", "⁻": "^-"}
     return re.sub(r"n_(c\d)([⁺⁻]?)", lambda found: rf"n$_{{\mathrm{{{found[1]}}}}}{signs[found[2]]}$", words)

@@ -18,16 +18,16 @@ from sweep.plots.panels import Panel, Panels, title
 from sweep.plots.scales import Limits, Scale, thinned
 
 _WIDEST = 4.4
-"""Inches of a map across, at most."""
+"""Largest width of a map in inches."""
 
 _SMALL = 2.2
-"""Inches of a map across below which numbers and symbols do not fit on its lines."""
+"""Width of a map in inches below which numbers and symbols do not fit on its lines."""
 
 _TICK = 0.2
-"""Inches of a bar for each of its ticks, at least."""
+"""Smallest distance in inches between the ticks of a bar."""
 
 _AROUND = 1.2
-"""Inches across of what stands around maps."""
+"""Width in inches of the labels and bars around maps."""
 
 _OF_DIFFERENCES = ("failed", "not_run", "impossible", "no_value", "time_limit")
 """Kinds of cell that maps of differences and ratios mark too; the map of the simulated counts next to them has all."""
@@ -91,7 +91,7 @@ def _scales(panels: Panels, maps: Maps, limits: Limits | None, cmap: str | None)
 
 
 def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool = False) -> dict[str, Artist]:
-    """Draw one map; returns the legend entries of its lines.  A map of how two others compare has fewer marks."""
+    """Draw one map; returns the legend entries of its lines.  A map that compares two others has fewer marks."""
     set_scale(axes, "x", shown.x.values)
     set_scale(axes, "y", shown.y.values)
     values = np.ma.masked_where(shown.blank, shown.values)
@@ -107,7 +107,7 @@ def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool
 
 
 def _title(panels: Panels, name: str, panel: Panel, *, topmost: bool) -> str:
-    """Name what the maps of a column show, unless their bar does, and below it the values of the other axes."""
+    """Name the variable of a column of maps, unless their bar does, and below it the values of the other axes."""
     words, compared = labels.words(panels.dataset, name), name in panels.compared
     if panels.compared:
         words = words.rpartition(", ")[2] if compared else labels.short(name).partition(", ")[2] or "simulated"
@@ -133,7 +133,7 @@ def _label_axes(
 
 
 def _bar(beside: list[Axes], dataset: xr.Dataset, name: str, scale: Scale, most: int = 12) -> None:
-    """Draw the bar of a scale to the right of the maps that share it, with its label."""
+    """Draw the bar of a scale, with its label, to the right of the maps that share it."""
     figure = beside[0].figure
     bar = figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=beside, extend=scale.arrows, pad=0.02)
     bar.set_label(labels.common(dataset, name))
@@ -148,11 +148,11 @@ def _meanings(panels: Panels, maps: Maps, scale: Scale) -> list[Artist]:
     handles: list[Artist] = []
     name, whole = panels.names[0], panels.whole
     if maps[0][name].flags:
-        found, size = with_results(whole, name)
+        found = with_results(whole, name)
         for value, words in (scale.ticks or {}).items():
             if count := int((found == value).sum()):
                 colour = scale.rgba(np.array(value)).tolist()
-                handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{words} ({count} of {size})"))
+                handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{words} ({count})"))
     kinds = legend(whole, name)
     if "no_value" in (compared := legend(whole, [*panels.names, *panels.compared][-1])):
         kinds["no_value"] = compared["no_value"]

@@ -1,6 +1,6 @@
 """Classify the cells of a dataset by their kind of result, so that figures distinguish certain counts from others.
 
-From the dataset alone, and without any library that draws.
+This needs the dataset alone, and no plotting library.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from sweep.results.dataset import STATUS_WORDS, VARIABLES
 WORDS = {
     "not_run": "not run",
     "failed": "failed",
-    "impossible": "impossible body, or one that cannot stand",
+    "impossible": "impossible body",
     "no_value": "no value",
-    "time_limit": "lower bound: reached the time limit",
-    "inferred": "inferred from neighbouring cells, not simulated",
-    "noise_limited": "limited by round-off: the count is certain, late times are not",
-    "uncertain": "uncertain count, near a boundary",
+    "time_limit": "lower bound: time limit",
+    "inferred": "inferred, not simulated",
+    "noise_limited": "limited by round-off",
+    "uncertain": "uncertain count",
 }
-"""The kinds of cell, and what they mean.  A cell may be of several kinds, but of one of the first four at most."""
+"""The kinds of cell, and their meanings.  A cell may be of several kinds, but only one of the first four."""
 
 BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
@@ -40,13 +40,13 @@ _PER_VARIABLE = {
     ("reversal_times", "no_value"): "no such reversal",
     **dict.fromkeys(
         [("spin_final", "time_limit"), ("spin_mean", "time_limit"), ("t_stop", "time_limit")],
-        "not settled: reached the time limit",
+        "not settled: time limit",
     ),
 }
 
 
 def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
-    """For each kind in `WORDS`, where the cells are of that kind.
+    """Return the cells of each kind in `WORDS`.
 
     Parameters
     ----------
@@ -84,16 +84,15 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
 
 
 def legend(dataset: xr.Dataset, name: str) -> dict[str, str]:
-    """Word a legend for each kind that occurs: its words, and how many cells are of it."""
-    counts = {kind: (int(where.sum()), where.size) for kind, where in marks(dataset, name).items()}
-    return {k: f"{_meaning(dataset, name, k)} ({count} of {size})" for k, (count, size) in counts.items() if count}
+    """Return the legend entry of each kind that occurs, with the number of its cells."""
+    counts = {kind: int(where.sum()) for kind, where in marks(dataset, name).items()}
+    return {kind: f"{_meaning(dataset, name, kind)} ({count})" for kind, count in counts.items() if count}
 
 
-def with_results(dataset: xr.Dataset, name: str) -> tuple[Array, int]:
-    """The values of the cells that have a result to draw, shape (cells,), and the number of all cells."""
+def with_results(dataset: xr.Dataset, name: str) -> Array:
+    """The values of the cells that have a result to draw, shape (cells,)."""
     found, kinds = field(dataset, name), marks(dataset, name)
-    blank = np.any([kinds[kind].values for kind in BLANK], axis=0)
-    return found.values[~blank], found.size
+    return np.asarray(found.values[~np.any([kinds[kind].values for kind in BLANK], axis=0)])
 
 
 def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
@@ -103,7 +102,7 @@ def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
     if kind == "inferred" and field(dataset, name).dtype.kind == "f":
-        return "not simulated: only counts are inferred"
+        return "not simulated"
     return _PER_VARIABLE.get((name, kind), WORDS[kind])
 
 

@@ -1,6 +1,6 @@
 """Choose what a figure of a dataset shows: variables, axes, and a panel for each value of other axes.
 
-Free of any library that draws.
+This needs no plotting library.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture,
 from sweep.results.kind import odd_axis
 
 MAX_PANELS = 8
-"""Panels that a figure may have."""
+"""Largest number of panels in a figure."""
 
 _MAX_VALUES = 1000
-"""Values drawn of an axis of a map, taken evenly: more would be less than a pixel each.  The others are not read."""
+"""Largest number of values of an axis drawn in a map, evenly chosen: with more, each would be less than a pixel.  The
+others are not read."""
 
 _TELLING = 3
-"""Maps of probabilities, each of another count, that one figure shows unasked."""
+"""Number of maps of probabilities, one per count, in a figure by default."""
 
 _PANEL_VALUES = 4
-"""An axis of more values is drawn as an axis; one of fewer gets a panel for each value."""
+"""A longer axis is drawn as an axis; a shorter one gets a panel for each value."""
 
 
 Panel = dict[str, int]
@@ -45,7 +46,7 @@ class Panels:
     whole: xr.Dataset
     """All cells."""
     names: list[str]
-    """The variable, or the two that it compares: what shares a scale."""
+    """The variable, or the two that it compares, which share a scale."""
     compared: list[str]
     """Their comparison, for maps alone: `difference` or `ratio`."""
     across: list[str]
@@ -83,7 +84,7 @@ def choose(
     if x is not None and x == y:
         raise fault_of(f"{x} is the other axis already; choose two axes", "y")
     across = _across(dataset, dims, x, y)
-    if names == ["probability"]:  # a curve of one point says less than bars do
+    if names == ["probability"]:  # bars show more than curves of one point
         across = [d for d in across if dataset.sizes[d] > 1 or d in (x, y)]
     rest = [d for d in dims if d not in across]
     if names == ["probability"] and len(across) < 2:
@@ -102,13 +103,14 @@ def choose(
 
 
 def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
-    """For each axis of `sel`, its value nearest to the one asked for; `ConfigError` where there is no such axis."""
+    """Return the value of each axis of `sel` that is nearest to the requested one; `ConfigError` if there is no such
+    axis."""
     return {name: float(dataset[name][i]) for name, i in _nearest(dataset, sel).items()}
 
 
 def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
-    """The places of these values along their axes."""
-    found = {}
+    """Return the indices of these values along their axes."""
+    nearest = {}
     for name, wanted in sel.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
@@ -119,13 +121,13 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
             raise fault_of(f"{name} = {wanted}; give a finite number", "sel")
         values = dataset[name].values
         low, high = values.min(), values.max()
-        # Half a cell beyond the ends, as the cells of a map go.
+        # Half a cell beyond the ends, like the cells of a map.
         beyond = (high - low) / (len(values) - 1) / 2 if len(values) > 1 else abs(low) / 2
         if not low - beyond <= at <= high + beyond:
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             raise fault_of(f"{name} = {at:g} is far from all its values, {span}; choose one of them", "sel")
-        found[name] = int(np.abs(values - at).argmin())
-    return found
+        nearest[name] = int(np.abs(values - at).argmin())
+    return nearest
 
 
 def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
@@ -140,12 +142,12 @@ def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
 
 
 def indices(dataset: xr.Dataset, dims: list[str]) -> list[Panel]:
-    """All indices along `dims`, a panel each."""
+    """Return all indices along `dims`, one for each panel."""
     return [dict(zip(dims, index, strict=True)) for index in product(*(range(dataset.sizes[d]) for d in dims))]
 
 
 def title(dataset: xr.Dataset, panel: Panel) -> str:
-    """Name what sets a panel apart from the others."""
+    """Name the values that distinguish a panel from the others."""
     return ", ".join(labels.measured(dataset, d, float(dataset[d][i])) for d, i in panel.items())
 
 
@@ -166,6 +168,6 @@ def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) 
 
 
 def _telling(dataset: xr.Dataset) -> list[int]:
-    """The indices of up to three counts whose probability differs most from cell to cell, in their order."""
+    """Return the indices of up to three counts whose probability differs most from cell to cell, in ascending order."""
     over = [d for d in dataset["probability"].dims if d != "count"]
     return sorted(np.argsort(-dataset["probability"].std(over).values)[:_TELLING].tolist())

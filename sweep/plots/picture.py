@@ -44,10 +44,10 @@ from sweep.units import LENGTH, quantity
 _NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 _NARROWEST, _WIDEST = 0.05, 1.0
-"""Metres of a figure across."""
+"""Largest width of a figure in metres."""
 
 _GROWTH = 1.15
-"""Steps in which the size is sought that has room."""
+"""Factor between sizes in the search for one that has room."""
 
 _OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
     TRAJECTORY: trajectories.draw,
@@ -92,14 +92,14 @@ def plot(
         and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
         that was changed
     figsize : width and height in inches, by default as high as the panels need
-    title : whether the figure has one
+    title : whether the figure has a title
     ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
     output : file to write; its suffix names the format: png, pdf, svg or eps
 
     Returns
     -------
-    The figure.  Boundaries and fits have figures of their own, as the command draws them that finds them, and so have
-    critical spins and trajectories of which no `variable` is named.
+    The figure.  Boundaries and fits have their own figures, the same as those of the commands that find them; so have
+    critical spins and trajectories if no `variable` is named.
 
     Raises
     ------
@@ -155,13 +155,13 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
 
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
     """Draw a dataset of any kind."""
-    found = kind(dataset)
-    if found and found in _OWN and (found != CRITICAL or variable is None):
-        options = {"variable": variable if found != TRAJECTORY else None, **axes, **how}
+    of_kind = kind(dataset)
+    if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
+        options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, **how}
         if given := [name for name, value in options.items() if value]:
-            raise fault_of(f"not for a figure of {found.words}; leave it out", given[0])
+            raise fault_of(f"not for a figure of {of_kind.words}; leave it out", given[0])
         require_whole(dataset)
-        return _OWN[found](dataset) if variable is None else trajectories.draw(dataset, variable)
+        return _OWN[of_kind](dataset) if variable is None else trajectories.draw(dataset, variable)
     chosen = panels.choose(dataset, variable, **axes, alone=is_column())
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:
@@ -212,7 +212,7 @@ def _of_size(
 
 
 def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> None:
-    """Draw one map or curve into axes of the user."""
+    """Draw one map or curve into the user's axes."""
     if kind(dataset) != RUN:
         raise fault_of("only a map or a curve of a run is drawn into given axes", "ax")
     chosen = panels.choose(dataset, variable, **axes, alone=True)
@@ -236,7 +236,7 @@ def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | Non
 
 
 def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None) -> list[Artist]:
-    """Draw the panels of a run that are no maps; returns the entries for their legend."""
+    """Draw the panels of a run other than maps; returns the entries for their legend."""
     draw = probabilities.draw if chosen.names == ["probability"] else curves.draw
     return draw(chosen, frames, limits)
 

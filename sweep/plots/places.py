@@ -1,6 +1,6 @@
 """Place words on the lines of a map: counts on boundaries, and symbols on critical spins.
 
-Without any library that draws.
+This needs no plotting library.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sweep.grid import Array
 from sweep.plots.theory import Line, Points
 
 _HALF = np.array([0.045, 0.035])
-"""Half the width and height of a word, as a share of the map."""
+"""Half the width and half the height of a word, as shares of the map."""
 
 _LARGE = 0.25
 """Smallest size of a part of a line that needs a word, as a share of the map."""
@@ -27,8 +27,8 @@ Word = tuple[float, float, str]
 def legible(lines: Iterable[Line], x: Axis, y: Axis, *, room: bool = True) -> tuple[list[Line], list[Word]]:
     """The lines of a map to draw, and the words on them.
 
-    A boundary means nothing without its number: parts that have no room for one are left out, and all boundaries of a
-    map without `room` for words.
+    A boundary has no meaning without its number: parts without room for one are left out, and so are all boundaries of
+    a map without `room` for words.
     """
     ordered = sorted(lines, key=lambda line: line.name != "boundary")
     placed = list(_placed(ordered, x, y)) if room else []
@@ -43,7 +43,7 @@ def legible(lines: Iterable[Line], x: Axis, y: Axis, *, room: bool = True) -> tu
 def words(lines: Iterable[Line], x: Axis, y: Axis) -> Iterator[Word]:
     """Place the symbols of lines on a map: near the middle of each part, off other symbols and the edges.
 
-    Small parts have none, unless they are the largest of their line; nor have parts without room for one.
+    Small parts get no symbol, unless they are the largest of their line; parts without room get none either.
     """
     return (word for word, _ in _placed(lines, x, y))
 

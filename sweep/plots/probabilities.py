@@ -19,7 +19,7 @@ from sweep.plots.scales import Limits
 from sweep.results.probabilities import interval, sound
 
 _COLOURS = 0.85
-"""Part of the colour map that curves take: its last colours are too light for lines."""
+"""Part of the colour map used for curves: its last colours are too light for lines."""
 
 
 def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
@@ -50,12 +50,12 @@ def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
         axes.plot(at, one["probability"], ".-", color=colour, linewidth=1.2, label=title(each, {"count": i}))
         ends = one["probability_low"], one["probability_high"]
         axes.fill_between(at, *ends, color=colour, alpha=0.25, linewidth=0)
-        axes.vlines(at, *ends, color=colour, linewidth=0.6)  # of a point between failures, there is no band
+        axes.vlines(at, *ends, color=colour, linewidth=0.6)  # a point between failures has no band
     axes.set_ylabel("probability, with its interval of 95 %")
 
 
 def _bars(axes: Axes, chosen: xr.Dataset, *, lowest: bool) -> None:
-    """Draw the probability of each count, or of a chosen one or more and of fewer, with its interval."""
+    """Draw the probability of each count, or of at least a chosen count and of fewer, with its interval."""
     at_least = np.concatenate([[1.0], np.atleast_1d(chosen["probability"]), [0.0]])
     share: Array = np.array([more - still for more, still in pairwise(at_least)])
     axes.bar(np.arange(len(share)), share, color="C0", label="share of the samples", zorder=2)

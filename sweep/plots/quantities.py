@@ -1,6 +1,6 @@
-"""List what can be drawn of a dataset: its variables, quantities derived from them, and its subject.
+"""List the quantities of a dataset that can be drawn: its variables, quantities derived from them, and its subject.
 
-Pictures and the explorer share these.  From the dataset alone, and without any library that draws.
+Pictures and the explorer share these.  This needs the dataset alone, and no plotting library.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ DERIVED = {
     "ratio": Derived(("t_first_reversal", "t_first_reversal_predicted"), _ratio),
     "regime": Derived(regimes.NEEDS, regimes.regimes),
 }
-"""`difference`: how many more reversals are simulated than predicted; `ratio`: how many times as late the first
-reversal is simulated as predicted; `regime`: see `sweep.plots.regimes`."""
+"""`difference`: simulated minus predicted reversals; `ratio`: time of the first reversal, simulated divided by
+predicted; `regime`: see `sweep.plots.regimes`."""
 
 COMPARISONS = {"difference": DERIVED["difference"].needs, "ratio": DERIVED["ratio"].needs}
 """The simulated variable and the prediction that each compares, which their figures show as well."""
@@ -56,7 +56,7 @@ _SUBJECTS = (
 
 
 def derivable(dataset: xr.Dataset) -> list[str]:
-    """The quantities that can be derived from the variables of a dataset, of which the status has to be one still."""
+    """The quantities that can be derived from the variables of a dataset, whose status must still be a code."""
     coded = "status" in dataset and labels.is_code(dataset["status"])
     there = {str(name) for name in dataset.data_vars if name != "status" or coded}
     return [name for name, derived in DERIVED.items() if set(derived.needs) <= there]
@@ -81,7 +81,7 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def with_derived(dataset: xr.Dataset) -> xr.Dataset:
-    """The dataset with all that can be derived from its variables."""
+    """The dataset with all quantities that can be derived from its variables."""
     return dataset.assign({name: field(dataset, name) for name in derivable(dataset)})
 
 
@@ -91,7 +91,7 @@ def pictured(dataset: xr.Dataset) -> list[str]:
 
 
 def check_pictures(config: Config) -> None:
-    """Raise a `ConfigError` where a configuration names a picture of what its run does not have."""
+    """Raise a `ConfigError` if a configuration names a picture of a variable that its run does not have."""
     measured = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
     there = {variable for spec in config.measure for variable in MEASURES[spec.partition("=")[0]].variables}
     known = {*VARIABLES, *PROBABILITIES, *DERIVED}
@@ -106,7 +106,7 @@ def check_pictures(config: Config) -> None:
 
 
 def subject(dataset: xr.Dataset) -> str:
-    """The variable that a dataset is about: the first picture that its configuration names, or else of `_SUBJECTS`.
+    """The subject of a dataset: the first picture that its configuration names, or else of `_SUBJECTS`.
 
     Empty if it has none of these.
     """
@@ -115,7 +115,7 @@ def subject(dataset: xr.Dataset) -> str:
 
 
 def first_picture(dataset: xr.Dataset) -> str:
-    """Return what to draw of a dataset by default: its `subject`, compared with a prediction if there is one.
+    """Return the variable of a dataset to draw by default: its `subject`, compared with a prediction if there is one.
 
     A picture named in the configuration is drawn without a comparison.
     """

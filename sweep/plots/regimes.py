@@ -1,6 +1,6 @@
 """Regimes of motion: the long-term behaviour of a body, inferred from the measurements of a run.
 
-From the dataset alone, and without any library that draws.
+This needs the dataset alone, and no plotting library.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import xarray as xr
 from sweep.kernels.status import SETTLED
 
 REGIMES = ("settles", "few_reversals", "reverses_regularly", "wanders", "undecided")
-"""The names of the regimes, whose codes are their places.  A cell is of the first whose condition it meets."""
+"""The names of the regimes, in the order of their codes.  A cell belongs to the first whose condition it meets."""
 
 FEWEST = 4
 """Reversals needed to judge their regularity: two cycles."""
@@ -20,7 +20,7 @@ SAME = 0.01
 """Variation of the cycles, relative to their mean, below which a body reverses regularly."""
 
 SURE = 3.0
-"""Standard errors above zero beyond which a Lyapunov exponent is taken for positive."""
+"""Number of standard errors above zero beyond which a Lyapunov exponent counts as positive."""
 
 NEEDS = ("status", "reversals", "cycle_variation", "lyapunov", "lyapunov_error")
 """The variables from which the regime is inferred."""
@@ -29,10 +29,10 @@ NEEDS = ("status", "reversals", "cycle_variation", "lyapunov", "lyapunov_error")
 def regimes(dataset: xr.Dataset) -> xr.DataArray:
     """The regime of each cell, one of `REGIMES`.
 
-    A body that has settled reverses no more.  Of the others, those that have reversed less than `FEWEST` times until
-    the time limit are set apart.  If the lengths of the cycles vary by less than `SAME`, the body reverses regularly;
-    if they vary more and the largest Lyapunov exponent is positive by `SURE` standard errors, it wanders.  If neither,
-    the run was too short to tell quasi-periodic motion from chaos.
+    A body that has settled reverses no more.  Bodies that have reversed less than `FEWEST` times by the time
+    limit have a regime of their own.  If the lengths of the cycles vary by less than `SAME`, the body reverses
+    regularly; if they vary more and the largest Lyapunov exponent is positive by `SURE` standard errors, it wanders.
+    Otherwise the run was too short to distinguish quasi-periodic motion from chaos.
     """
     status, reversals, variation, exponent, error = (dataset[name] for name in NEEDS)
     conditions = [status == SETTLED, reversals < FEWEST, variation < SAME, exponent > SURE * error]

@@ -23,10 +23,10 @@ Arrows = Literal["both", "min", "max", "neither"]
 SEQUENTIAL, DIVERGING = "viridis", "PuOr_r"
 
 _MAX_COUNTS = 24
-"""Colours of a scale of counts; neighbours of more would look the same."""
+"""Largest number of colours of a scale of counts; with more, neighbours would look the same."""
 
 _MAX_DIFFERENCES = 10
-"""Colours on each side of zero of a scale of differences."""
+"""Number of colours on each side of zero of a scale of differences."""
 
 _MAX_RATIO = 2.0
 """Ratios beyond this, or below its inverse, share the last colours."""
@@ -34,7 +34,7 @@ _MAX_RATIO = 2.0
 _MAX_TICKS = 12
 
 LARGEST = 10**15
-"""Largest size of a limit: up to here a float holds every count."""
+"""Largest limit: up to this size a float holds every count."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Scale:
     ticks: dict[float, str] | None = None
     """Labels of the bar, by value; None leaves them to the library that draws."""
     arrows: Arrows = "neither"
-    """Ends of the bar beyond which there are values."""
+    """Ends of the bar that values exceed."""
 
     def rgba(self, values: Array) -> Array:
         return np.asarray(self.colours(self.norm(values)))
@@ -57,9 +57,9 @@ class Scale:
 
 
 def colour_map(name: str) -> Colormap:
-    """A colour map of matplotlib; `ConfigError` if there is none of that name."""
+    """Look up a colour map of matplotlib; `ConfigError` if the name is unknown."""
     if name not in mpl.colormaps:
-        raise fault_of(f"there is no colour map {name}; choose one of matplotlib's, such as viridis or gray", "cmap")
+        raise fault_of(f"there is no colour map {name}; choose one of matplotlib's, such as viridis or cividis", "cmap")
     return mpl.colormaps[name]
 
 
@@ -69,14 +69,14 @@ def counts(values: Array, limits: Limits | None = None, name: str | None = None)
     Parameters
     ----------
     values : integers
-    limits : lowest and highest count with colours of their own; all beyond share one on either side
+    limits : lowest and highest count with their own colours; all counts beyond share one colour on either side
     """
     low, high = _whole(limits) if limits else (int(values.min()), int(values.max()))
     return _stepped(low + _steps(high - low, _MAX_COUNTS), values, name or SEQUENTIAL)
 
 
 def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
-    """A diverging scale of integers, the same on both sides of zero, which has a colour of its own."""
+    """A diverging scale of integers, symmetric about zero, which has its own colour."""
     top = max(max(map(abs, _whole(limits))) if limits else int(np.abs(values).max(initial=0)), 1)
     side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
     return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
@@ -129,7 +129,7 @@ def _smooth(values: Array, norm: Normalize, name: str) -> Scale:
 
 
 def _arrows(values: Array, low: float, high: float) -> Arrows:
-    """At which ends there are values beyond."""
+    """The ends of a scale that values exceed."""
     slack = 1e-9 * max(abs(low), abs(high))
     below, above = (values < low - slack).any(), (values > high + slack).any()
     return "both" if below and above else "min" if below else "max" if above else "neither"
@@ -143,7 +143,7 @@ def _whole(limits: Limits) -> list[int]:
 
 
 def _steps(top: int, most: int) -> Array:
-    """Where the ranges of the counts 0 to `top` begin, and the last one ends: at most `most` ranges.
+    """The beginnings of at most `most` ranges of the counts 0 to `top`, and the end of the last one.
 
     Each ends at a multiple of its width, which is 1, 2, 5, 10, 20 and so on, and no less than that of the range below.
     """
@@ -174,7 +174,7 @@ def _stepped(steps: Array, values: Array, name: str) -> Scale:
 
 
 def thinned(ticks: dict[float, str], most: int) -> dict[float, str]:
-    """At most so many ticks, evenly chosen, among them zero."""
+    """Choose at most `most` ticks, evenly spaced and including zero."""
     every = -(-len(ticks) // max(most, 1))
     start = list(ticks).index(0) % every if 0 in ticks else 0
     return dict(list(ticks.items())[start::every])

@@ -1,6 +1,6 @@
 """Lines that theory adds to a picture: critical spins, which explain edges, and the shape of largest form factor.
 
-From the dataset alone, and without any library that draws.
+This needs the dataset alone, and no plotting library.
 """
 
 from __future__ import annotations
@@ -66,10 +66,9 @@ def levels(one: xr.Dataset) -> list[tuple[str, str, float, str]]:
     return [(name, sign, float(at), source) for name, sign, at, source in spins if np.isfinite(at)]
 
 
-def words(name: str, source: str, *, over_n0: bool, spin: str = "n₀") -> str:
+def words(name: str, source: str, *, over_n0: bool) -> str:
     """Word a legend for n_c1 or n_c2, in figures over the spin or over other parameters."""
-    where = f"|{spin}| is larger" if over_n0 else f"{name} < {spin}"
-    return f"{name} ({source}): {WORDS[name]} where {where}"
+    return f"{WORDS[name]}{f' beyond {name}' if over_n0 else f': {name} < n₀'} ({source})"
 
 
 def lines(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
@@ -131,7 +130,7 @@ def _best_words(b: float) -> str:
 
 
 def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
-    """A critical spin over the other axis than n0."""
+    """Draw a critical spin over the axis other than n0."""
     spin, other = (x, y) if x.name == "n0" else (y, x)
     along = _axis(values, other).values
     spins = np.broadcast_to(values.values, along.shape).astype(float)

@@ -20,7 +20,7 @@ from sweep.plots import labels, theory
 from sweep.plots.figure import Picture, is_column, panel_width, zero_line
 from sweep.results.kind import is_of_own_body, parameters
 
-# Title and the series drawn together; two panels stand beside each other.
+# Titles, and the series drawn together; panels are in pairs.
 _PANELS: tuple[tuple[str, dict[str, str]], ...] = (
     ("contact point along x", {"contact_x": "x"}),
     ("contact point along y", {"contact_y": "y"}),
@@ -35,25 +35,25 @@ _PANELS: tuple[tuple[str, dict[str, str]], ...] = (
 )
 
 _MOST_ENTRIES = 12
-"""Trajectories named in the legend."""
+"""Largest number of trajectories named in the legend."""
 
 _SHADES = (0.55, 1.0)
 """Opacity of the first and of the second series of a panel."""
 
 _STILL = 0.05
-"""Share of a series' range below which a change is no event."""
+"""Share of the range of a series below which a change does not count as an event."""
 
 _WHILE = 1.4
 """End of the time axis, relative to the time of the last event."""
 
 _ENDLESS = ("heading", "table_x", "table_y")
-"""Series that go on where a body spins steadily."""
+"""Series that keep changing while a body spins steadily."""
 
 
 def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     """Draw the spin with its reversals and critical values over time, and below it the other series of the dataset.
 
-    The time axis ends a while after the last event (`lively_until`).  In a column of text, the spin stands alone.
+    The time axis ends a while after the last event (`lively_until`).  In a column of text, only the spin is drawn.
 
     Parameters
     ----------
@@ -141,7 +141,8 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 
 
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
-    """Lines at the critical spins, one set a body: in the colour of its first trajectory if there are several."""
+    """Draw lines at the critical spins, one set per body: in the colour of its first trajectory if there are
+    several."""
     bodies: dict[tuple[tuple[str, str, float, str], ...], int] = {}
     for i in range(dataset.sizes["trajectory"]):
         bodies.setdefault(tuple(theory.levels(dataset.isel(trajectory=i))), i)
@@ -151,16 +152,16 @@ def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
         for name, _, at, source in body:
             style: Any = {"linestyle": theory.OVER_TIME[name], "linewidth": 0.9}
             axes.axhline(at, color=colour, gid=name, **style)
-            words = theory.words(name, source, over_n0=True, spin="n")
+            words = theory.words(name, source, over_n0=True)
             entries[name] = Line2D([], [], color=mpl.rcParams["text.color"], label=words, **style)
     return list(entries.values())
 
 
 def lively_until(dataset: xr.Dataset) -> float:
-    """The time a while after the last event: what a time axis shows, at most to the end of the series.
+    """Return the end of a time axis: a while after the last event, but not beyond the end of the series.
 
-    The last event of a body that has settled is its last reversal.  That of any other body is the last notable change
-    of a series other than heading and path, which go on for ever.
+    The last event of a body that has settled is its last reversal.  For any other body it is the last notable change
+    of a series other than heading and path, which change for ever.
     """
     last = max(_last_event(one) for one in _each(dataset))
     end = float(dataset["time"][-1])
@@ -168,7 +169,7 @@ def lively_until(dataset: xr.Dataset) -> float:
 
 
 def _each(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The single trajectories of a dataset, or the one that it is."""
+    """The trajectories of a dataset, or the dataset itself if it is a single one."""
     count = dataset.sizes.get("trajectory")
     return [dataset] if count is None else [dataset.isel(trajectory=i) for i in range(count)]
 
@@ -206,7 +207,7 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 
 def label(dataset: xr.Dataset, i: int) -> str:
-    """Its name, or the parameters that set this trajectory apart from the others, and its number of reversals."""
+    """Its name, or the parameters that distinguish this trajectory from the others, and its number of reversals."""
     if "trajectory" in dataset.coords and dataset["trajectory"].dtype.kind in "UO":
         return str(dataset["trajectory"].values[i])
     names = _varying(dataset) or [name for name in ("n0", "omega3") if name in dataset]
@@ -223,5 +224,5 @@ def constants_apart(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _varying(dataset: xr.Dataset) -> list[str]:
-    """The parameters that not all trajectories share."""
+    """The parameters that differ between trajectories."""
     return [name for name in parameters(dataset) if np.unique(dataset[name]).size > 1]

@@ -126,7 +126,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("slip1: 0,", "n0: 1,")), 6, "start.n0", "with omega1, omega2, omega3, pitch, roll, slip2; give either n0, x0, y0 or angles"),
     (stone(("roll: 0.5 deg", "roll: 30 min")), 6, "start.roll", "not '30 min'"),
     (stone(("roll: 0.5 deg", "roll: 91 deg")), 6, "start.roll", "< 1.5708, not 1.588"),
-    (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "means nothing with surface: paraboloid; give the elements of inertia instead"),
+    (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "has no meaning with surface: paraboloid; give the elements of inertia instead"),
     ("body: {surface: paraboloid, b: 0.2, Ixx: 1, Iyy: 1, Izz: 1}\nfriction: {mu: 1}", 1, "body.a", "missing"),
     (stone(BOWL, ("offset: 0.01", "offset: 0.02")), 4, "body", "centre of mass outside the paraboloid; keep offset < c (at a=0.01"),
     (stone(("{a: 0.2", "{surface: paraboloid, a: 1.1")), 4, "body", "upright rest is not stable"),

@@ -68,7 +68,7 @@ def test_neighbours_do_not_notice(edge: xr.Dataset, write: Write) -> None:
 def test_maps_leave_them_blank(edge: xr.Dataset) -> None:
     kinds = marks(edge, "reversals")
     np.testing.assert_array_equal(kinds["impossible"].values, np.any([kinds[kind] for kind in BLANK], axis=0))
-    assert legend(edge, "reversals")["impossible"] == "impossible body, or one that cannot stand (8 of 18)"
+    assert legend(edge, "reversals")["impossible"] == "impossible body (8)"
     assert int(marks(edge, "spin_final")["no_value"].sum()) == 0
 
 

@@ -85,14 +85,18 @@ def stopped(process: subprocess.Popen[str]) -> tuple[int, str, str]:
 
 @pytest.fixture(scope="module")
 def go(browser: Browser, served: str) -> Iterator[Open]:  # noqa: ARG001  whose pages close before it ends
-    """Opens an address on a page of its own; there must be no error on the console of any."""
+    """Opens an address on a page of its own; there must be no error and no warning on the console of any."""
     complaints = list[str]()
 
     def opened_at(place: str) -> Page:
         page = context.new_page()
         page.set_default_timeout(TIMEOUT)
-        page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
+
+        def complain(what: object) -> None:
+            complaints.append(f"{page.url}: {what}")
+
+        page.on("console", lambda message: message.type in ("error", "warning") and complain(message.text))
+        page.on("pageerror", complain)
         page.goto(place)
         return page
 
@@ -416,7 +420,7 @@ def test_cells_are_overlaid_and_removed(page: Page) -> None:
     control(page, "remove 1", "button").click()
     wait_for_curves(page, 1)
     assert curves(page)[0].startswith("1: μ = 70")
-    model(page, "spin", "m.properties.visible.change.connect(() => { window.flickers = true })")
+    model(page, "curves", "m.properties.children.change.connect(() => { window.flickers = true })")
     page.mouse.click(*place(page, 2, 2))
     wait(page, "curve legend", "/μ = 60/.test(m.items[0].label.value)")
     assert page.url.count("cell=") == 1
@@ -596,7 +600,7 @@ def test_a_click_runs_a_users_model_that_the_user_names(go: Open, tmp_path: Path
         wait_for_curves(page, 1)
         count = run["reversals"].isel(spot).item()
         assert curves(page)[0].endswith(f"torque = 1.2, {count} reversals")
-        wait(page, "body", "!m.visible")
+        wait(page, "played", "!m.visible")
         enter(page, "parameter torque", "1.5")
         wait(page, "curve legend", "/torque = 1.5, .*reversals/.test(m.items[0].label.value)")
         page.close()

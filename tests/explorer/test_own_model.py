@@ -71,8 +71,8 @@ def test_no_other_code_is_run(source: Source, folder: Path, tiny: Path, monkeypa
         (source, folder / "other.py", f"--model: '{digest}', but .*other.py has [0-9a-f]{{64}};"),
         (source, folder / "missing.py", "--model: .*no such file"),
         (source, "sliip", "--model: .*sliip is neither a Python file nor an entry point"),
-        (bare, folder / "pendulum.py", "--model: no user brought the model of bare.nc; leave the option out$"),
-        (open_source(tiny), folder / "pendulum.py", "--model: no user brought .*; leave the option out$"),
+        (bare, folder / "pendulum.py", "--model: the model of bare.nc is not a user's; leave the option out$"),
+        (open_source(tiny), folder / "pendulum.py", "--model: the model of .* is not a user's; leave the option out$"),
     ):
         with pytest.raises(ConfigError, match=f"^{message}"):
             Setup(dataset, str(model), lambda words: pytest.fail(words))

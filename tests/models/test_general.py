@@ -303,7 +303,7 @@ def test_every_law_is_viscous_to_the_linear_theory() -> None:
 
 def test_no_variant_takes_a_body_that_it_does_not_describe() -> None:
     for name, constant in (("slip+viscous+gravity", "offset"), ("slip+viscous+offset", "g")):
-        with pytest.raises(ValueError, match=f"^{constant}: no such body is in this scene"):
+        with pytest.raises(ValueError, match=f"^{constant}: this scene has no such body"):
             find(name).constants.of(cells(**KANE_LEVINSON, mu=1.0))
 
 

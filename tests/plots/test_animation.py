@@ -85,6 +85,16 @@ def test_the_first_reversal_is_in_the_middle_of_the_clip() -> None:
     assert animation._until(turning(2).assign_attrs(model_brings="a model")) == pytest.approx(10, rel=3e-3)
 
 
+def test_all_bodies_have_one_scale() -> None:
+    """Also a film's, whose contact point is not known to travel."""
+    bodies = turning(2)
+    bodies["table_x"][1], bodies["table_y"][1] = 0.0, 0.0
+    scene = animation._Scene(bodies, np.linspace(0, 10, 11))
+    travelling, still = ((each.axes.get_xlim(), each.axes.get_ylim()) for each in scene.bodies)
+    assert np.ptp(travelling, axis=1) == pytest.approx(np.ptp(still, axis=1))
+    assert travelling != still
+
+
 def test_a_page_asks_nothing_of_the_network(tmp_path: Path) -> None:
     animation.animate(turning(), tmp_path / "clip.html", end=1, speed=10)
     page = (tmp_path / "clip.html").read_text(encoding="utf-8")

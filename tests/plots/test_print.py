@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from support.cli import invoke, refused
 from support.figures import entries, made
 
+from sweep.kernels.status import DIVERGED, IMPOSSIBLE, LIFT_OFF, TIME_LIMIT
 from sweep.plots import picture
 from sweep.results.netcdf import open_dataset, write
 
@@ -59,6 +60,43 @@ def test_a_figure_for_a_column_has_one_bar_and_is_no_page(starts: int, variable:
     assert len({axes.get_subplotspec().colspan.start for axes in panels}) == min(starts, 3)
     assert figure.get_figheight() * 25.4 < 130
     assert min(axes.bbox.width for axes in panels) > 14 / 25.4 * figure.dpi
+
+
+@pytest.mark.parametrize("marked", [3, 7])
+def test_a_legend_has_few_rows(marked: int) -> None:
+    """With all four lines, and with some or nearly all kinds of cell at once."""
+    one = made()
+    one["margin_more"], one["margin_fewer"] = 0 * one["spin_final"] + 0.5, 0 * one["spin_final"] + 0.5
+    one["noise_limited"].values[6, 0, 0] = 1
+    one["sensitive"] = one["noise_limited"].roll(b=1)
+    if marked > 3:
+        one["status"].values[:5, 0, 0] = [0, LIFT_OFF, DIVERGED, IMPOSSIBLE, TIME_LIMIT]
+        one["inferred"] = one["noise_limited"].roll(mu=1)
+    figure = picture.plot(one, "reversals", width="180mm")
+    drawn = entries(figure)
+    assert len(drawn) == marked + 4
+    (legend,) = figure.legends
+    assert -(-len(drawn) // legend._ncols) <= (3 if marked == 3 else 4)
+    figure.draw_without_rendering()
+    assert legend.get_window_extent().width <= figure.bbox.width
+
+
+@pytest.mark.parametrize("width", ["85mm", "180mm", None])
+def test_a_fit_fills_its_figure(width: str | None) -> None:
+    """An empty line for outliers had left hardly any room for the panels."""
+    time = np.linspace(0, 12, 100)
+    series = {name: ("time", np.cos(time)) for name in ("seen", "fitted")}
+    names = ("value", *(f"{end}_{share}" for end in ("lower", "upper") for share in (68, 95)))
+    values = {name: ("parameter", [0.3]) for name in names} | {"edge": ("parameter", [0])}
+    attributes = {"sweep_kind": "fit", "title": "a fit", "verdict": "The curve fits the film.\n" * 3, "noise": 0.05,
+                  "undetermined": ""}  # fmt: skip
+    one = xr.Dataset(series | values, {"time": time, "parameter": ["mu"]}, attributes)
+    figure = picture.plot(one, width=width)
+    figure.draw_without_rendering()
+    above, below = (axes.get_window_extent() for axes in figure.axes)
+    assert above.y0 - below.y1 < 0.1 * figure.bbox.height
+    assert above.height + below.height > 0.45 * figure.bbox.height
+    assert above.width > 0.5 * figure.bbox.width
 
 
 def test_a_wide_figure_compares_maps_side_by_side() -> None:

@@ -6,13 +6,13 @@ points:
 1. Adams-Bashforth predicts (u, M); extrapolation from five points predicts the slip.
 2. At the predicted point, the slow derivatives are evaluated, and one Newton step of BDF5 gives the new slip.
 3. Adams-Moulton of order nine corrects (u, M).  It is made linearly implicit by the constant matrix
-   P = (1 - h w_0 J)⁻¹, where J is the matrix of the rocking about upright rest.  Without P the method is unstable at
-   useful steps.
+   P = (1 - h w_0 J)⁻¹, where J is the matrix of the rocking about upright rest.  Without P the method would be unstable
+   at useful steps.
 4. The slow derivatives are evaluated again, with the new slip, and the same correction is made once more.
 
 The Adams weights are exact for polynomials, and for cos and sin at the fastest rocking frequency ν and at 3 ν.  The
 third harmonic dominates the error of the plain weights, and fitting it costs nothing in the step.
-What else was tried, with figures: scripts/LOG.md.
+scripts/LOG.md lists what else was tried, with figures.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _HISTORY = tuple(name.format(slot) for slot in range(HISTORY) for name in POINT)
 
 
 class Adams(Stepper):
-    """Takes the steps of this method; its states contain M in place of ω.
+    """The stepper of this method; its states contain M in place of ω.
 
     Where the rattle is so small that its linear modes describe it to within `tolerance` in spin, these
     carry the trajectory on, without steps (`sweep.kernels.adams.stretches`), if they are known (`MODES`).
@@ -71,7 +71,7 @@ class Adams(Stepper):
         self.form, self.model, self.tolerance = form, form.model, tolerance
 
     def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
-        """What looks for small rattle need, the weights and the matrix P, and the history."""
+        """Quantities for looks at small rattle, for the weights and the matrix P, and for the history."""
         looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if MODES in self.model.offers else ()
         powers = stretches.POWERS if WORK in follows else ()
         return (*looks, "begin", "spin", *powers, "gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX, *_HISTORY)
@@ -79,7 +79,7 @@ class Adams(Stepper):
     def images(
         self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
     ) -> Array:
-        """As `Kernel.images`, but the images are those at the end of start-up, at the time in `begin`."""
+        """As `Kernel.images`, except that the images are those at the end of start-up, at the time in `begin`."""
         levels = count_levels(self.form.slip_decay(columns), step)
         lead = duration(levels)
         steps = np.maximum(steps_to(t_end, step), lead + 1)
@@ -118,7 +118,7 @@ class Adams(Stepper):
         table["gamma"] = BDF_GAMMA * step
 
     def _set_started(self, kernel: Kernel, table: Table, ended: Table, history: Array) -> None:
-        """Set the state after start-up, and do what looks and measurements would have done during it."""
+        """Set the state after start-up, and make up for the looks and measurements that it skipped."""
         before = kernel.steady_spin(table.images)
         table.set_columns(self.model.states, ended.columns(self.model.states))
         table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
@@ -136,7 +136,7 @@ class Adams(Stepper):
             each.skip(table, stretch)
 
     def _set_looks(self, table: Table, columns: Columns) -> None:
-        """Set below which energy, and after which step, looks search for a stretch of small rattle."""
+        """Set the energy below which, and the step after which, looks search for a stretch of small rattle."""
         reach, goal = linear.fastest_spin(self.model, columns), table["goal"]
         tolerance = self.tolerance / self.form.time_unit(columns)
         table["quiet_energy"] = stretches.quiet_energy(reach)
@@ -151,9 +151,9 @@ class Adams(Stepper):
     def make_run_block(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
 
-        Each step appends a point to a history that begins with the eight points of the image.  So one step is
-        compiled, not one for each place in a ring of eight.  The history is not part of the group: LLVM sees then that
-        no step reads from one what it has written to the other.
+        Each step appends a point to a history that begins with the eight points of the image.  So a single step
+        is compiled, rather than one for each place in a ring of eight.  The history is not part of the group: LLVM then
+        recognises that writes to one cannot affect reads from the other.
         """
         known = names(self.form) | {"watch": kernel.make_watch(), "full_width": full_width(), "np": np}
         first, size = kernel.layout.at(_HISTORY[0]), len(POINT) * LANES
@@ -173,7 +173,7 @@ class Adams(Stepper):
     def _step_lines(self, kernel: Kernel) -> list[str]:
         """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.
 
-        The lines are the body of the loop itself.  If they were a function of their own, LLVM would unroll the loop
+        The lines form the body of the loop itself.  In a separate function, LLVM would unroll the loop
         over lanes before inlining it, and nothing would be vectorised.
         """
         points, work = places(POINT), ["work = 0.0"]
@@ -202,7 +202,7 @@ class Adams(Stepper):
 
 # The error in spin at t = 400 is about n ρ θ⁶, within a factor of ten for most of 877 wide cells, where θ is the phase
 # of the fastest motion in a step, ρ the share by which the rattle may raise the decay rate of the slip, and n the
-# fastest spin within reach.  How strongly an error grows is decided by the motion itself, and found by the run
+# fastest spin within reach.  The growth of an error depends on the motion itself, and the run finds it
 # (`sweep.engine.errors`).
 _POWER = 6
 _LONGEST_PHASE = 0.4

@@ -1,9 +1,9 @@
 """Start-up of the stiff method: from zero slip, through the initial layer of width 1/μ, to a history of eight points.
 
 The slip does not start at its slow value, the one that follows from the slow variables.  Short steps of dopri5 resolve
-how it gets there, and leave a first history.  The stiff method goes on from this with plain weights, and doubles its
-step until it has the one wanted.  `LANES` trajectories that need equally many doublings go side by side.  Each is
-computed by itself, so it does not matter which ones.
+the transition, and leave a first history.  The stiff method goes on from this with plain weights, and doubles its
+step until it reaches the final one.  `LANES` trajectories that need the same number of doublings run side by side.
+Each is computed independently, so their choice does not matter.
 """
 
 from __future__ import annotations
@@ -41,15 +41,16 @@ from sweep.models.model import Array
 from sweep.models.stiff.form import StiffForm
 from sweep.models.theory.rocking import implicit
 
-# Steps of dopri5, in widths of the layer, and their number.  A step is at least half as long as that, unless the final
-# one is shorter.  Every second one of the last steps is a point of the history.  The slip has forgotten how it began
+# Steps of dopri5, in widths of the layer, and their number.  A step is at least half that long, unless the final one is
+# shorter.  Every second one of the last steps is a point of the history.  The slip has forgotten how it began
 # after a quarter of them, but while it has not, BDF5 would lose more accuracy in one step than dopri5 does in all of
-# them, and such an error hardly depends on the step: no companion tells it.  With half as many, one of 278 wide cells
-# was off by more than 3 times a tolerance of 1e-10 unawares; with a quarter, hard taps left 5 to 20 times the error.
+# them, and such an error hardly depends on the step, so no companion run reveals it.  With half as many, one of 278
+# wide cells was off by more than 3 times a tolerance of 1e-10 without notice; with a quarter, hard taps left 5 to 20
+# times the error.
 _SHARE, _DOPRI5_STEPS = 0.5, 224
 
 # A level is the part of start-up before each doubling of the step.  While the slip still decays, a level takes extra
-# steps, so that the decay does not show in the next one.  With them the floor of the error in spin at t = 400 is below
+# steps, so that the decay does not affect the next one.  With them the floor of the error in spin at t = 400 is below
 # 1e-10; without, the error is up to twelve times that of the method itself at h = 0.03.
 _LAYER_LEVELS, _EXTRA_STEPS = 2, 6
 
@@ -70,7 +71,7 @@ def count_levels(slip_decay: Array, step: Array) -> Array:
 
     `slip_decay` is the rate at which the slip decays at first; both it and the result are of shape (cells,).
     """
-    step = np.minimum(step, 1e9)  # a sphere at rest has no motion that a step would have to follow
+    step = np.minimum(step, 1e9)  # a sphere at rest has no motion for a step to follow
     return np.maximum(1, np.ceil(np.log2(step * slip_decay / (2 * _SHARE)))).astype(np.int64)
 
 
@@ -118,7 +119,7 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
     ended, history = np.empty((len(step), len(kept.names))), np.empty((len(step), HISTORY, len(_POINT)))
 
     def take(cells: Array) -> None:
-        """Take the cells of one group through start-up; lanes that would stay empty repeat the last of them."""
+        """Take the cells of one group through start-up; empty lanes repeat the last cell."""
         lanes, steps = np.pad(cells, (0, LANES - len(cells)), mode="edge"), _steps(levels[cells[0]])
         group = np.zeros((len(kept.names), LANES))
         group[: begins.shape[1]] = begins[lanes].T
@@ -135,7 +136,7 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
 
 
 def _places(form: StiffForm) -> At:
-    """The place at which the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
+    """The place where the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
     kept = layout(form)
 
     def at(name: str) -> str:
@@ -193,7 +194,7 @@ def _record(form: StiffForm, at: At) -> list[str]:
 
 
 def _replace(form: StiffForm, at: At) -> list[str]:
-    """Replace a state of the full model by that of the stiff form."""
+    """Replace a state of the full model by the state of the stiff form."""
     replaced = (f"{at(name)} = s[{i}]" for i, name in enumerate(form.model.states))
     return [*load_lines(form, at), "s = momentum(y, p)", *replaced]
 

@@ -40,10 +40,11 @@ WORK_RULE = "h / 24.0 * (9.0 * {} + 19.0 * {} - 5.0 * {} + {})"
 points, newest first."""
 
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
-"""Elements of P, the implicit part of the corrector (see `sweep.models.theory.rocking.implicit`)."""
+"""Names of the elements of P, the implicit part of the corrector (see `sweep.models.theory.rocking.implicit`)."""
 
 At = Callable[[str], str]
-"""Tells where a quantity of one lane is kept: (name) -> an expression that can be read and assigned to."""
+"""A function that gives the place of a quantity of one lane: (name) -> an expression that can be read and assigned
+to."""
 
 
 def places(point: Sequence[str]) -> dict[str, int]:
@@ -106,7 +107,7 @@ def make_solve(form: StiffForm):
 
 
 def names(form: StiffForm) -> dict[str, Any]:
-    """Name what the generated lines refer to."""
+    """Bind the names in the generated lines."""
     return {"solve": make_solve(form), "Constants": form.model.constants}
 
 
@@ -121,8 +122,8 @@ def load_lines(form: StiffForm, at: At) -> list[str]:
 def advance_lines(form: StiffForm, at: At) -> list[str]:
     """Lines that take a lane, if it is `active`, from the eight points of the history, slots 0 … 7, to the ninth.
 
-    They need what `load_lines` sets, and `status`.  They set `new`, slopes, `spin`, (num, den) and `power`, as `solve`
-    returns them, and `sound` and `accepted`.
+    They need the names that `load_lines` sets, and `status`.  They set `new`, slopes, `spin`, (num, den) and `power`,
+    as `solve` returns them, and `sound` and `accepted`.
     """
     lines = [f"q{i} = g{i} = y[{i}]" for i in range(5)]
     lines += ["e0 = e1 = b0 = b1 = 0.0"]

@@ -5,8 +5,7 @@ then grow again from noise, and the reversal that it causes would come too early
 
 * Where A is small, the trajectory *leaps* to the time at which A leaves the linear range.
 * Until A has reversed the spin, B has no influence, and is *lifted*: the state holds it e^s times too large, and the
-  image keeps s.  The next leap, during which B grows, lowers it again.  So no bit of B is lost, however small it
-  becomes.
+  image keeps s.  The next leap, during which B grows, lowers it again.  So B loses no digit, however small it becomes.
 
 A leap or a lift changes the spin at second order in the sizes α of the modes; this change is applied to M3.  With d the
 distance of the spin from the critical spin of the mode, an error of the order of d α⁴ in spin is left, and for a lifted
@@ -14,7 +13,7 @@ mode d α²/2 for as long as it is lifted; both are kept below `tolerance`.
 
 When a growing mode is read off the state, less than tolerance/n of it comes from the other mode: from its *products*,
 that is through the nonlinear terms, and from its round-off.  Products make up less than 1e-5 of a lifted mode.
-Figures, and what else was tried: scripts/LOG.md.
+scripts/LOG.md has figures, and lists what else was tried.
 """
 
 from __future__ import annotations
@@ -52,11 +51,11 @@ _PRODUCTS, _ROUND_OFF = 0.3, 1e-14
 # A lifted mode that exceeds the largest size for a leap by this factor has not been lowered in time.
 _LATE = 1.5
 
-# Number of steps from which on a leap is worthwhile: resolving a rattle into its modes takes as long as two thousand
+# Number of steps above which a leap is worthwhile: resolving a rattle into its modes takes as long as two thousand
 # steps, and most looks find nothing to do.
 WORTHWHILE = 20_000
 
-# Share of a mode that may be products or round-off of the other if there is no time to wait for less.
+# Largest share of a mode that may be products or round-off of the other if there is no time to wait for less.
 _AT_WORST = 0.1
 
 # Stands for a size of zero where the logarithm is taken.
@@ -74,7 +73,7 @@ _RATTLE = tuple(STATES[i] for i in RATTLE)
 
 @dataclass(frozen=True)
 class Leap:
-    """Says what to do with each cell; arrays of shape (cells,) unless stated otherwise."""
+    """A decision for each cell; arrays of shape (cells,) unless stated otherwise."""
 
     now: Array
     """True where it leaps now."""
@@ -87,7 +86,7 @@ class Leap:
 
 
 def quiet_energy(reach: Array) -> Array:
-    """2 E / I3 below which a rattle is looked at, shape (cells,).
+    """2 E / I3 below which a rattle is examined, shape (cells,).
 
     It is large enough for a look to notice any lifted mode that has not been lowered in time.  `reach` is the largest
     spin that the energy allows, shape (cells,).
@@ -96,7 +95,7 @@ def quiet_energy(reach: Array) -> Array:
 
 
 def first_look(model: Model, columns: Columns, reach: Array, time: Array, steps: Array, tolerance: Array) -> Array:
-    """Step from which on looks are of use in a run of length `time` and `steps` steps: 0 or infinity, shape (cells,).
+    """The step after which looks are of use in a run of length `time` and `steps` steps: 0 or infinity, shape (cells,).
 
     Assumes that at the start neither mode is tiny compared with the other.
     """
@@ -106,9 +105,10 @@ def first_look(model: Model, columns: Columns, reach: Array, time: Array, steps:
 
 
 def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps: Array) -> Array:
-    """Tell whether the run left is too short for looks: for a leap to pay, and for a mode to sink and come back.
+    """Return whether the rest of the run is too short for looks: for a leap to pay, and for a mode to sink and come
+    back.
 
-    To sink is meant as in `_sinks`.  `rate` is the fastest rate of the modes, `lowest` the logarithm of the size of the
+    Sinking is defined in `_sinks`.  `rate` is the fastest rate of the modes, `lowest` the logarithm of the size of the
     smaller one; `share` is a logarithm too.
     """
     below = np.log(_ROUND_OFF) - share
@@ -116,7 +116,7 @@ def _brief(rate: Array, share: Array, lowest: Array | float, time: Array, steps:
 
 
 def carry(form: StiffForm, kernel: Kernel, images: Array, tolerance: float) -> None:
-    """Carry the images that are `QUIET` on by the modes of their rattle, where that is of use, and set them running."""
+    """Advance the images that are `QUIET` by the modes of their rattle, where that is of use, and set them running."""
     quiet = np.flatnonzero(kernel.table(images)["status"] == QUIET)
     if not len(quiet):
         return
@@ -137,7 +137,7 @@ def carry(form: StiffForm, kernel: Kernel, images: Array, tolerance: float) -> N
 
 
 def _given_up(kernel: Kernel, table: Table, sizes: Array) -> Array:
-    """The lifts in `table`, without those of modes not lowered in time, which are given up.
+    """The lifts in `table`; those of modes not lowered in time are given up.
 
     Such a mode has already acted on the spin at its lifted size.
     """
@@ -157,7 +157,7 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
     ----------
     sizes : sizes α of the modes as the state holds them, shape (cells, 2)
     lifts : present s of the modes, whose true sizes are α e^-s, shape (cells, 2)
-    spin, step, tolerance : of shape (cells,), the tolerance being that of a spin
+    spin, step, tolerance : of shape (cells,), where the tolerance is in spin
     left : number of steps to the time limit, shape (cells,)
     """
     with np.errstate(all="ignore"):
@@ -188,7 +188,7 @@ def plan(rattle: Rattle, sizes: Array, lifts: Array, spin: Array, step: Array, l
         np.put_along_axis(after, (1 - growing)[:, None], np.where(sinks, np.maximum(cap - low, 0), 0)[:, None], 1)
 
         # After a leap there is nothing to do until the growing mode has reversed the spin; likewise for a rattle that
-        # grows out of the linear range.  A rattle that decays into it is looked at when it gets there.
+        # grows out of the linear range.  A rattle that decays into it is examined when it gets there.
         swings = np.where(seen.rate_g > 0, np.maximum(-np.where(now, largest, seen.log_g), 1) / seen.rate_g, np.inf)
         falls = np.where(rates < 0, (logs - largest[:, None]) / -rates, 0).max(axis=1)
         wait = np.where(small & use & ~now, unclear, np.where(small | (falls <= 0), swings, falls))
@@ -215,7 +215,7 @@ class _Modes(NamedTuple):
 
 
 def _sinks(true: _Modes, low: Array, largest: Array, share: Array, stirred: Array) -> Array:
-    """Tell whether the decaying mode, of size `low` after a leap, sinks to where round-off makes up a `share` of it.
+    """Return whether the decaying mode, of size `low` after a leap, sinks to where round-off makes up a `share` of it.
 
     It does not count as sinking if what the other mode excites in it (`stirred`) comes near its lowest size: that would
     be lowered with it.  All arguments except `true` are logarithms.
@@ -228,8 +228,8 @@ def _sinks(true: _Modes, low: Array, largest: Array, share: Array, stirred: Arra
 def _stirred(rattle: Rattle, rate: Array) -> Array:
     """Logarithm of the size that A excites in B while it reverses the spin, shape (cells,).
 
-    A grows and decays as 1/cosh(r t), where r is its `rate`, and so drives B, whose frequency differs by Δν, to
-    exp(-π Δν / 2 r).
+    A grows and decays as 1/cosh(r t), where r is its `rate`, and so excites B, whose frequency differs by Δν, to
+    the size exp(-π Δν / 2 r).
     """
     nu = rattle.rates.imag
     return np.asarray(-np.pi * (nu[:, 1] - nu[:, 0]) / (2 * rate))
@@ -301,7 +301,7 @@ def move(kernel: Kernel, images: Array, rattle: Rattle, steps: Array, lifts: Arr
 
 
 def _move_history(table: Table, rattle: Rattle, factors: Array) -> None:
-    """Move the slopes and slips of past steps.  Their modes are read off the slopes, in which they are λ z."""
+    """Advance the slopes and slips of past steps.  Their modes are read off the slopes, where they are λ z."""
     for slot in range(HISTORY):
         rocking, turn = [name.format(slot) for name in SLOPES[:4]], SLOPES[4].format(slot)
         slips = [name.format(slot) for name in SLIPS]
@@ -312,7 +312,7 @@ def _move_history(table: Table, rattle: Rattle, factors: Array) -> None:
 
 
 def _move_powers(form: StiffForm, table: Table, constants: Any) -> None:
-    """Set the power of friction at the last points, with the attitude and the normal force of the last state."""
+    """Set the power of friction at the last points, using the attitude and the normal force of the last state."""
     y = table.columns(STATES).T
     _, geometry = form.slow(*y, constants)
     _, _, numerator, denominator = form.newton(*y[[0, 1, 5, 6]], geometry, 0.0, 0.0, 0.0, constants)

@@ -6,7 +6,7 @@ combination of four vectors that contribute nothing to the powers below k - 4:
 
     w = w_plain + N c,   Σ_j t_j^q N_jr = δ_(q, k-4+r).
 
-So four unknowns c are left.  The coefficients of their equations are power series in θ² whose terms depend only on
+This leaves four unknowns c.  The coefficients of their equations are power series in θ² whose terms depend only on
 the nodes.  The terms are computed once, in exact fractions; a cell then costs 20 polynomials and the elimination.
 """
 
@@ -48,7 +48,7 @@ def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
     for terms in series[::-1]:
         A = A * square + terms[:, None]
     c = _solve(A.reshape(4, 5, -1))
-    # Term by term: the sums of a matrix product depend on how many cells there are.
+    # Term by term, because the sums of a matrix product depend on the number of cells.
     return np.asarray(plain + sum(c[r, :, None] * null[:, r] for r in range(4)))
 
 
@@ -56,7 +56,7 @@ def fitted_weights(nodes: tuple[int, ...], phase: Array) -> Array:
 def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
     """Plain weights (k,), N (k, 4), and the series in θ² of the four equations for c, shape (terms, 4 · 5).
 
-    cos and sin enter with the part of their Taylor series removed that is met anyway: those of θ t as
+    cos and sin enter without the part of their Taylor series that is met anyway: those of θ t as
     Σ_m a_m θ^(2m) t^(n + 2m), with a_m = (-1)^m n! / (n + 2m)! and n = k - 4 or k - 3, and those of the harmonic as a
     divided difference in θ², divided by a_1.  In this form the equations become c = 0 as θ goes to zero.
     """
@@ -66,7 +66,7 @@ def _tables(nodes: tuple[int, ...]) -> tuple[Array, Array, Array]:
     null = [row[k - 4 :] for row in inverse]
 
     def moments(q: int) -> list[F]:
-        """Σ t^q N, and the part of ∫ t^q that the plain weights miss."""
+        """Compute Σ t^q N, and the part of ∫ t^q that the plain weights miss."""
         powers = [F(t) ** q for t in nodes]
         sums = [sum((t * row[r] for t, row in zip(powers, null, strict=True)), F(0)) for r in range(4)]
         return [*sums, F(1, q + 1) - sum((t * w for t, w in zip(powers, plain, strict=True)), F(0))]
@@ -104,7 +104,7 @@ def _plain(inverse: list[list[F]]) -> list[F]:
 def _solve(A: Array) -> Array:
     """Solutions of four equations, shape (4, cells), by Gauss-Jordan elimination; A is of shape (4, 5, cells).
 
-    It does without pivoting, because up to θ = 0.6 the diagonal stays away from zero.
+    No pivoting is needed, because up to θ = 0.6 the diagonal stays away from zero.
     """
     A = A.copy()
     for r in range(4):

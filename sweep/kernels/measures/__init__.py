@@ -1,4 +1,4 @@
-"""Lists what can be measured on a trajectory; each measurement has a file."""
+"""List the measurements; each has its own file."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
 
 
 def with_decay(measurements: tuple[Measurement, ...], tier: Tier) -> tuple[Measurement, ...]:
-    """`measurements`, and `Decay` where they ask for a count that it can make final."""
+    """Add `Decay` to `measurements` that include a count which it can make final."""
     counted = {*Decay.needs} <= {each.name for each in measurements}
     return (*measurements, Decay()) if counted and Decay.asks in tier.offers else measurements
 
@@ -49,5 +49,5 @@ def possible(tier: Tier) -> tuple[str, ...]:
 
 
 def default(tier: Tier) -> tuple[str, ...]:
-    """Specs of the measurements that are made on a model if the configuration names none."""
+    """Specs of the measurements made on a model by default."""
     return tuple(MEASURES[name]().spec for name in possible(tier) if MEASURES[name].by_default)

@@ -1,4 +1,4 @@
-"""Measures how regularly the spin reverses: the mean length of a cycle, and how much cycles differ.
+"""Measure how regularly the spin reverses: the mean length of a cycle, and how much cycles differ.
 
 A cycle is the time from one reversal to the second after it, when the spin changes sign in the same sense.  Single
 intervals would not do: the two modes grow at different rates, so that those of the two senses differ even in motion

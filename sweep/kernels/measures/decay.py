@@ -1,14 +1,14 @@
-"""Foresees what the rattle of a trajectory will do to its spin, so that a run can end before it is all over.
+"""Predict the effect of the rattle of a trajectory on its spin, so that a run can end early.
 
-Nobody asks for it: every kernel that counts the reversals of a model with two rocking modes has it.  It keeps what the
-slow equations foresee of a state (`resting_spin.endings`), so that they are solved once, and it watches rattles that
-roll round and round, as those of nearly round bodies do: no equations for these are at hand.
+It cannot be requested: every kernel that counts the reversals of a model with two rocking modes has it.  It keeps the
+prediction of the slow equations for a state (`resting_spin.endings`), so that they are solved once.  It also watches
+circular rattles, as in nearly round bodies, for which there are no such equations.
 
-At regular looks it takes M·u/J33, where the spin goes while the rattle decays (`sweep.models.stiff.precession`), and
-finds the slope with which that changes with the energy, by least squares over all looks of a window (Welford 1962,
+At regular looks it takes M·u/J33, to which the spin tends while the rattle decays (`sweep.models.stiff.precession`),
+and finds the slope with which that changes with the energy, by least squares over all looks of a window (Welford 1962,
 Technometrics 4, 419).  If `STEEPER` times this slope and all the energy left carry the spin neither through zero nor to
 where a rattle grows, no reversal will come.  Of 423 cells of `configs/mu_b.yaml` that nothing else settles by
-t = 30 000, that is so of 334; none of these reverses by t = 10⁶, while 27 of the others do.
+t = 30 000, this holds for 334; none of these reverses by t = 10⁶, while 27 of the others do.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ NEXT, EVERY = "watch_next", "watch_every"
 """The step of the next look, infinite if there is none, and the steps between two."""
 
 WOUND, LEFT = "spin_when_wound_down", "windows_left"
-"""By the last window: the least spin that is left when the rattle has wound down, 0 unless no reversal can come; and
-how many windows more it takes to wind down at this rate, 0 if its energy has not fallen."""
+"""Results of the last window: the least spin that remains when the rattle has decayed, 0 unless no reversal can come;
+and the number of further windows that it takes to decay at this rate, 0 if its energy has not fallen."""
 
 LOOKS = 256
 """Looks in a window, less one.  Of the roundest bodies of `mu_b` a rattle loses 0.03 % of its energy in a tenth of the
-patience, so that few looks would not tell this from the ripple of M·u/J33, which is 3e-6."""
+patience, so that a few looks could not distinguish this from the ripple of M·u/J33, which is 3e-6."""
 
 STEEPER = 8.0
 """The slope of M·u/J33 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
@@ -43,16 +43,17 @@ STEEPER = 8.0
 _SLOW = 0.5
 
 _WINDOW = ("looks", "first_spin", "first_total", "mean_spin", "mean_total", "sum_squares", "sum_products")
-"""Of the present window: the number of looks; M·u/J33 and the spin squared that would have all the energy, at the first
-look and on average; the sum of the squares of the latter's deviations from its average, and that of the products."""
+"""For the present window: the number of looks; M·u/J33 and the square of the spin that would have all the energy, at
+the first look and on average; the sum of the squares of the latter's deviations from its average, and that of the
+products."""
 
 FORESEEN = ("foreseen_at", "foreseen_spin", "foreseen_reversals", "foreseen_overshoot", "foreseen_nearest")
-"""One more than the step at which an ending was foreseen, 0 if none was, and the ending (`final_spin.Ending`)."""
+"""One more than the step at which an ending was predicted, 0 if none was, and the ending (`final_spin.Ending`)."""
 
 
 class Decay(Measurement):
     name = "decay"
-    summary = "what the rattle will do to the spin after the run"
+    summary = "effect of the rattle on the spin after the run"
     asks = MODES
     needs = ("reversals",)
     quantities = (NEXT, EVERY, WOUND, LEFT, *_WINDOW, *FORESEEN)
@@ -104,7 +105,7 @@ class Decay(Measurement):
 
 
 def _make_states(layout: Layout):
-    """Inline (group, lane) -> the states of the stiff form, of a lane that has either set of variables."""
+    """Inline (group, lane) -> the states of the stiff form, for a lane with either set of variables."""
     model = layout.model
     load, constants = make_load(model.states, layout), make_load(constants_of(model), layout, model.constants)
     if model.states == STATES:

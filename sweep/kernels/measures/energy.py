@@ -1,4 +1,4 @@
-"""The energy balance: the work of friction has to account for all the energy that is lost.
+"""The energy balance: the work of friction must account for all the energy lost.
 
 dE/dt = -μ R |v_p|² holds exactly, so a violation is an error that a run measures by itself.
 """

@@ -3,13 +3,13 @@
 The growth is added up in bins of equal length.  When all `BINS` are full, pairs are merged and bins become twice as
 long, so that however long the trajectory is, between half and all of them are full.  The exponent is the mean over the
 later half of the full bins, which leaves out the start; its error is their scatter divided by the root of their number,
-and beside it 1/τ, with the length τ of that half.
+plus 1/τ, with the length τ of that half.
 
-The scatter is the statistical error for chaotic motion, whose bins are long against its memory.  1/τ is what another
-norm of the tangent might make of the exponent, a factor of e.  Without it the error was far too small where a bin is as
-long as a cycle of regular motion: all bins are alike then, whatever the phase of the cycle adds.  In regular motion the
-distance grows like the time at most, so that the exponent of a trajectory of the length T comes out as ln 2 / (T/2) or
-less, beside what the distance oscillates by.  See `docs/explanation/regimes.md`.
+The scatter is the statistical error for chaotic motion, whose bins are long compared with its memory.  1/τ is the
+change of the exponent that another norm of the tangent might cause, a factor of e.  Without it the error was far too
+small where a bin is as long as a cycle of regular motion: all bins are alike then, whatever the phase of the cycle
+adds.  In regular motion the distance grows like the time at most, so that the exponent of a trajectory of the length T
+comes out as ln 2 / (T/2) or less, apart from oscillations of the distance.  See `docs/explanation/regimes.md`.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Lyapunov(Measurement):
 
         @inline
         def look(group, lane, seen):
-            # A block that the end has cut short does not count.
+            # A block cut short by the end does not count.
             if seen.running & (group[DONE + lane] % BLOCK == 0.0):
                 group[SUM + lane] += group[GREW + lane]
                 group[LOOKS + lane] += 1.0

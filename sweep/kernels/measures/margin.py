@@ -1,4 +1,4 @@
-"""The margin of a count: how far in spin a trajectory was from one reversal more, and from one fewer.
+"""The margin of a count: the distance in spin of a trajectory from one more reversal, and from one fewer.
 
 After its last reversal the averaged spin makes one more arc: away from zero, and then perhaps back.  Its largest size
 in this arc, the *overshoot*, is the margin to one reversal fewer; its smallest size after that, the *nearest approach*,
@@ -6,7 +6,7 @@ is the margin to one more.  Where a count begins, the overshoot of the cells abo
 below fall to zero, nearly along one straight line: the overshoot above, and below the nearest approach with the sign
 changed, are a smooth function of the parameters, whose root is the boundary.
 
-Of a trajectory that settles, the slow equations tell what its spin does from then on (`resting_spin`).
+For a trajectory that settles, the slow equations give the further course of its spin (`resting_spin`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ EXTREMES = ("overshoot", "nearest_approach")
 
 class Margin(Measurement):
     name = "margin"
-    summary = "how far in spin each trajectory is from one reversal more, and from one fewer"
+    summary = "distance in spin of each trajectory from one more reversal, and from one fewer"
     asks = COUNT
     needs = ("reversals",)
     by_default = True

@@ -1,7 +1,7 @@
-"""Defines what a measurement is, and tells how to add one.
+"""Define what a measurement is, and explain how to add one.
 
 Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of `sweep.kernels.measures`.  The
-configuration, the kernels of all methods, the dataset and the plots then know it.  `first_reversal` is the shortest
+configuration, the kernels of all methods, the dataset and the plots then include it.  `first_reversal` is the shortest
 example.
 
 A measurement keeps its numbers in quantities of its own in each image, named by `quantities`.  It fills and reads
@@ -19,12 +19,12 @@ them in hooks, all of which are optional:
 
 A hook `make_…` is itself called once, when the kernel is made.  It returns None, or a function marked
 `sweep.jit.inline`, which becomes part of the compiled loop and is called as listed.  That happens for every lane, even
-one that is idle or has ended, so the function has to leave the quantities alone where its arguments say that nothing
-counts.  After a step it has to do so by conditional expressions rather than branches, so that the loop over lanes
-stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost` and `read` a
-quantity is `table["name"]`, of shape (images,).
+one that is idle or has ended, so the function must not change the quantities where its arguments say that the step
+does not count.  After a step it has to do so by conditional expressions rather than branches, so that the loop over
+lanes stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost` and `read`
+a quantity is `table["name"]`, of shape (images,).
 
-What a run does not measure takes no place in its images and leaves no instruction in its kernel.
+Whatever a run does not measure takes no space in its images and adds no instruction to its kernel.
 
 Units: times in sqrt(c/g), spins in sqrt(g/c), energies in m g c.
 """
@@ -44,26 +44,26 @@ from sweep.variables import Variable
 def measured(
     dtype: str, units: Unit, long_name: str, description: str = "", *, flag: str = "", along: str | None = None
 ) -> Variable:
-    """Describe a variable that a measurement adds to the dataset: it is undefined for a trajectory that failed.
+    """Describe a variable that a measurement adds to the dataset; it is undefined for a trajectory that failed.
 
-    `flag` names the value 1 of a variable that marks some cells; the value 0 is called "firm".
+    `flag` is the name of the value 1 of a variable that marks some cells; the value 0 is called "firm".
     """
     flags = {0: "firm", 1: flag} if flag else None
     return Variable(dtype, units, long_name, description, flags, along=along, of_sound_runs=True)
 
 
 WORK, RIPPLE, TANGENT = "work", "ripple", "tangent"
-"""What a measurement may follow: the work of friction, the ripple-free spin, or how fast a tangent grows
+"""Quantities that a measurement may follow: the work of friction, the ripple-free spin, or the growth of a tangent
 (`sweep.kernels.tangent`)."""
 
 
 class Step(NamedTuple):
-    """The step that a lane has taken, as `Measurement.make_step` gets it."""
+    """A step of one lane, as passed to `Measurement.make_step`."""
 
     accepted: bool
     """Whether the step counts; if not, no quantity may change."""
     spin: float
-    """Before the step."""
+    """Spin before the step."""
     steady: float
     """Ripple-free spin before the step (`theory.ripple`); the spin itself unless a measurement follows the `RIPPLE`."""
     work: float
@@ -75,14 +75,14 @@ class Step(NamedTuple):
 
 
 class Look(NamedTuple):
-    """What a look finds in a lane, as `Measurement.make_look` gets it."""
+    """The findings of a look at one lane, as passed to `Measurement.make_look`."""
 
     running: bool
     """Whether the trajectory was running before the look."""
     ended: bool
-    """Whether it has ended now."""
+    """Whether it has ended at this look."""
     spin: float
-    """At the time of the look."""
+    """Spin at the time of the look."""
     rattle: float
     """Energy of the rattle."""
     J: float
@@ -116,15 +116,15 @@ class Measurement:
     summary: ClassVar[str]
     """One line for the documentation."""
     asks: ClassVar[str]
-    """What a model has to offer for it: `COUNT`, `SPIN`, `ENERGY`, `MODES` or `FORMULAS` of `sweep.models.model`."""
+    """What a model must offer for it: `COUNT`, `SPIN`, `ENERGY`, `MODES` or `FORMULAS` of `sweep.models.model`."""
     needs: ClassVar[tuple[str, ...]] = ()
-    """Names of the measurements that it builds upon; a configuration has to ask for them too.  A measurement that
+    """Names of the measurements on which it builds; a configuration has to include them too.  A measurement that
     implements `make_at_reversal` needs "reversals"."""
     by_default: ClassVar[bool] = False
-    """It is made if the configuration names no measurement, provided that the model supports it."""
+    """Whether it is made by default, if the model supports it."""
     follows: ClassVar[frozenset[str]] = frozenset()
-    """What it needs in each step, which is computed only on request: `WORK`, `RIPPLE` or `TANGENT`.  A tangent needs a
-    method that `Method.takes_every_step`."""
+    """Which quantities it needs in each step; they are computed only on request: `WORK`, `RIPPLE` or `TANGENT`.  A
+    tangent needs a method that `Method.takes_every_step`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
@@ -138,7 +138,7 @@ class Measurement:
 
     @property
     def spec(self) -> str:
-        """The words by which it is asked for: its name, or "name=setting" if it has a setting."""
+        """Its name in a configuration, or "name=setting" if it has a setting."""
         return "=".join([self.name, *map(str, vars(self).values())])
 
     @property
@@ -148,7 +148,7 @@ class Measurement:
 
     @property
     def in_kernel(self) -> bool:
-        """True if a kernel with it differs from one without: it has a quantity, or a hook in the loop."""
+        """Whether it changes the kernel, by a quantity or by a hook in the loop."""
         hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_settled", "make_look")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
         return bool(self.quantities or own or self.follows)
@@ -167,8 +167,8 @@ class Measurement:
     def make_step(self, layout: Layout, at_reversal):
         """Inline (group, lane, taken) -> None, called after every step with its `Step`.
 
-        `at_reversal` calls what all measurements do at a reversal (see `make_at_reversal`).  It is for the
-        measurement that detects reversals.
+        `at_reversal` calls the hooks of all measurements for a reversal (see `make_at_reversal`).  It is
+        meant for the measurement that detects reversals.
         """
 
     def make_at_reversal(self, layout: Layout):
@@ -179,29 +179,30 @@ class Measurement:
         """
 
     def make_may_settle(self, layout: Layout):
-        """Inline (group, lane, spin, at_rest) -> bool: whether what is measured is final if the rattle only decays.
+        """Inline (group, lane, spin, at_rest) -> bool: whether the measured values are final if the rattle only decays.
 
         A trajectory settles only if this holds for all measurements.  `at_rest` says that spin and rattle are
         exactly zero.
         """
 
     def make_settled(self, layout: Layout):
-        """Inline (group, lane) -> bool: whether it has shown that the spin can reverse no more.
+        """Inline (group, lane) -> bool: whether this measurement shows that the spin can reverse no more.
 
         A trajectory settles if this holds for one measurement, and the other hook for all.
         """
 
     def make_look(self, layout: Layout):
-        """Inline (group, lane, seen) -> None, called at every look with what it finds, a `Look`."""
+        """Inline (group, lane, seen) -> None, called at every look with its findings, a `Look`."""
 
     def skip(self, table: Table, stretch: Stretch) -> None:
-        """Account, in `table`, for a stretch that its images have covered without steps: start-up or a leap.
+        """Update `table` for a stretch that its images have covered without steps: start-up or a leap.
 
         The other quantities of the images are already those at the end of the stretch.
         """
 
     def mode_lost(self, table: Table, images: Array) -> None:
-        """Account for a lifted mode that grew too large before it was lowered again, so that its lift is given up.
+        """Update `table` for a lifted mode that grew too large before it was lowered again, so that its lift is given
+        up.
 
         `images` is a mask over the images of `table`, shape (images,).
         """

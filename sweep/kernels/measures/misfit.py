@@ -1,6 +1,6 @@
 """The misfit of a trajectory to a film: the sum of squares of (computed - seen) / error over the film's instants.
 
-The engine takes it from samples once the trajectories have ended (`sweep.engine.misfits`).
+The engine computes it from samples once the trajectories have ended (`sweep.engine.misfits`).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Marks cells in which a mode of the rattle fell below the round-off of the other before it grew again.
+"""Mark cells in which a mode of the rattle fell below the round-off of the other before it grew again.
 
 A mode that has decayed to 1e-16 of the other is filled in by round-off.  When it grows again it grows from noise, and
 the reversal that it causes comes too early.  From one look to the next, the logarithm of each mode's amplitude is
-changed by the growth rate at the mean spin, within the limit set by the energy present.  How deep a mode had fallen
-is checked when it has come back.
+changed by the growth rate at the mean spin, within the limit set by the energy present.  The depth to which a mode
+had fallen is checked when it has come back.
 
 On 70 random bodies and starts, up to t = 30 000 (a = 10, δ = 0.03; truth in double-double), with the round-off of
 dopri5: of 35 that were flagged, 33 had a reversal whose time was off by more than 1 %; of 34 such trajectories,
@@ -68,7 +68,7 @@ class NoiseLimited(Measurement):
         }
 
     def make_look(self, layout: Layout):
-        """Follows the modes from one look to the next, as `Measurement.make_look`."""
+        """Follow the modes from one look to the next, as in `Measurement.make_look`."""
         LOG0, LOG1, DEPTH0, DEPTH1 = map(layout.at, (*_LOGS, *_DEPTHS))
         TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.quantities[-4:])
         RATE0, RATE1, terms = layout.at("rate0_0"), layout.at("rate1_0"), len(linear.NODES)

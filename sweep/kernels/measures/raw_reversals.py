@@ -1,4 +1,4 @@
-"""Raw reversals: every change of sign of the spin from one step to the next, those due to the ripple included."""
+"""Raw reversals: every change of sign of the spin from one step to the next, including those due to the ripple."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The spin at which a settled trajectory stays, when what is left of its rattle has decayed.
+"""The spin at which a settled trajectory remains when the rest of its rattle has decayed.
 
-A trajectory settles, and is left, while its rattle can still change its spin by a third: the spin where it was left is
-off by 4 to 6 % (median).  The slow equations (`sweep.models.stiff.final_spin`) give where it goes.  Of 79 settled cells
+A trajectory settles, and ends, while its rattle can still change its spin by a third: the spin at its end is off by
+4 to 6 % (median).  The slow equations (`sweep.models.stiff.final_spin`) give the final value.  Of 79 settled cells
 of the wide domain they were off by 1e-5 (median), by more than 0.1 % in 9 %, by 1.4 % at most; 29 bodies, nearly round
 or hardly damped, have none.  In a coarse `configs/mu_b.yaml` the median was 3e-5; there a few spins beyond n_c1 that
 still hold at t = 1e5, because the rattle that will turn them back is below 1e-14, make up all errors beyond 4 %.
@@ -26,12 +26,12 @@ from sweep.models.stiff.slip import form_of
 from sweep.units import SPIN
 
 _AT_A_TIME = 512
-"""Cells whose ends one thread finds together, at 30 kB a cell while that goes on."""
+"""Number of cells whose ends one thread finds together; each needs 30 kB meanwhile."""
 
 
 class RestingSpin(Measurement):
     name = "resting_spin"
-    summary = "spin at which a settled trajectory will stay"
+    summary = "final spin of a settled trajectory"
     asks = MODES
     by_default = True
 
@@ -47,9 +47,9 @@ class RestingSpin(Measurement):
 
 
 def endings(table: Table, which: Array) -> Ending:
-    """How the trajectories of a mask end that is left to their rattle; arrays over all, NaN where that is not known.
+    """Find how the trajectories of a mask end under their rattle alone; arrays over all cells, NaN where unknown.
 
-    A table that has a place for it keeps what was foreseen of a state.
+    If the table has a place for it, it keeps the prediction for a state.
     """
     result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), FORESEEN[0] in table.layout
     model = table.layout.model

@@ -1,6 +1,6 @@
 """The times of the first K reversals, K from the configuration: `measure: [reversals, {reversal_times: 12}]`.
 
-After a step only the latest times are shifted along; a look puts them where they belong.  Written in every step, five
+After a step only the latest times are shifted along; a look moves them to their places.  Written in every step, five
 times or more kept LLVM from vectorising the loop over lanes: 115 ns a step and lane in place of 21.
 """
 
@@ -18,7 +18,7 @@ from sweep.models.model import SPIN, Array, Columns, Model
 from sweep.units import TIME
 
 LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")
-"""Of more than three reversals between two looks, which are windows apart, the earlier ones have no time."""
+"""If there are more than three reversals between two looks, which are windows apart, the earlier ones have no time."""
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,8 @@ class Reversals(Measurement):
             phase, half, earlier = group[PHASE + lane] + h, group[HALF + lane], group[EARLIER + lane]
             over = phase - 0.5 * period
             closes = accepted & (over >= 0.0)
-            # The part of the step beyond the end of the half.  What is integrated changes slowly, so that its value
-            # before the step is good for the whole of it; half a step is taken off the time of the crossing.
+            # The part of the step beyond the end of the half.  The integrand changes slowly, so that its value before
+            # the step holds for the whole step; half a step is taken off the time of the crossing.
             after = over * steady
             half = half + h * steady
             closed = earlier + (half - after)

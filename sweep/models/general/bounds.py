@@ -1,4 +1,4 @@
-"""Bounds on what a body of `general` may do, from its energy at the start: how hard it presses, slips and turns.
+"""Bound how hard a body of `general` can press, slip and turn, from its energy at the start.
 
 The step of an explicit method, and the energy below which a law of friction is linear, follow.
 """
@@ -22,8 +22,8 @@ def faint_energy(speed: Array, columns: Columns, surface: Surface) -> Array:
 
     With ω = n u + o the slip v_p = v_g - x_p × o - n x_p × u is at most sqrt(2 E G) + |n| ρ.  G is the largest
     eigenvalue of 1 - [x_p] J⁻¹ [x_p], and ρ <= s sqrt(2 E / (g k)) the distance of the contact point from the
-    vertical through G, with the larger radius of curvature s and the stiffness k.  Spins up to sqrt(g/c) are allowed
-    for.
+    vertical through G, with the larger radius of curvature s and the stiffness k.  This allows for spins up to
+    sqrt(g/c).
     """
     c, g = columns["c"], rigid_body.gravity(columns)
     inverse = np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inverse(rigid_body.inertia(columns))))[:, -1]
@@ -54,12 +54,12 @@ def _energy_start(columns: Columns, surface: Surface) -> Array:
 
 _AZIMUTHS, _SHARES, _ROUNDS = 4, 7, 6
 
-# Tilts that are looked at, and how far beyond the last round, which comes from below.
+# Number of tilts examined, and how far beyond the last approximation, which comes from below.
 _FAINT, _FARTHEST, _BEYOND, _FLAT = 1e-6, 1.5, 1.01, 1e-30
 
 
 def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Vector, Array]]:
-    """Attitudes that a body may reach, for more and more tilted ones.
+    """Attitudes that a body may reach, at increasing tilts.
 
     Yields normals u with bounds on the normal force R, all of shape (azimuths, cells).
 

@@ -1,4 +1,4 @@
-"""Holds what the models with slip and without share: their scene, their constants, and how they are made."""
+"""Hold what the models with and without slip share: their scene, their constants, and how they are made."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ EXTRAS: dict[str, dict[str, float]] = {
     "skew": dict.fromkeys(("J13", "J23", "inv_J12", "inv_J13", "inv_J23"), 0.0),
     "gravity": {"g": 1.0},
 }
-"""What a body may have that the paper's does not: a centre of mass off the ellipsoid's, a third axis that is no axis of
-inertia, and gravity in other units; with the constants that are known without it."""
+"""Properties that the paper's body lacks: a centre of mass away from the ellipsoid's, a third axis that is not an axis
+of inertia, and gravity in other units; with the constants that are known without each."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """The scene of `slip` or `noslip`: what is not in it leaves no instruction in a kernel."""
+    """The scene of `slip` or `noslip`: whatever it lacks adds no instruction to a kernel."""
 
     law: Law | None
-    """Of slip friction; None for a body that does not slip."""
+    """The law of slip friction; None for a body that does not slip."""
     couples: tuple[Couple, ...] = ()
     surface: Surface = ELLIPSOID
     extras: frozenset[str] = frozenset()
-    """Out of `EXTRAS`."""
+    """A selection of `EXTRAS`."""
 
     @property
     def name(self) -> str:
-        """Name the variant, as in datasets and in the cache of compiled code: the paper's is `slip` or `noslip`."""
+        """The name of the variant in datasets and in the cache of compiled code: `slip` or `noslip` for the paper's."""
         base, law = ("slip", self.law.name) if self.law else ("noslip", SOLID)
         more = [couple.name for couple in self.couples] + [name for name in EXTRAS if name in self.extras]
         more += [self.surface.name] if self.surface != ELLIPSOID else []
@@ -52,7 +52,7 @@ class Variant:
 
     @property
     def skew(self) -> bool:
-        """Whether the third axis may be no axis of inertia."""
+        """Whether the third axis may differ from an axis of inertia."""
         return "skew" in self.extras
 
     @property
@@ -72,7 +72,7 @@ class Variant:
     ) -> type[Any]:
         """The constants of body, surface and couples, and `more`, as a `NamedTuple` class.
 
-        Its `of` raises a ValueError for bodies with what this scene does not have.
+        Its `of` raises a ValueError for bodies that this scene does not cover.
         """
         body, couples, surface, known = self.body, self.couples, self.surface, self.known
 
@@ -82,7 +82,7 @@ class Variant:
                 names = (*surface.constants, *rigid_body.BODY)
                 of_body = dict(zip(names, rigid_body.values(columns, surface), strict=True))
                 if others := [name for name in known if name in of_body and np.any(of_body[name] != known[name])]:
-                    raise ValueError(f"{', '.join(others)}: no such body is in this scene; name it in the variant")
+                    raise ValueError(f"{', '.join(others)}: this scene has no such body; name it in the variant")
                 of_couples = (value for couple in couples for value in couple.of(columns))
                 return cls(*(of_body[name] for name in body), *of_couples, *of_more(columns))
 

@@ -1,4 +1,4 @@
-"""What resists the motion of a general body: couples beside slip friction, and both together, with the power they take.
+"""Couples that resist the motion of a general body, alone and together with slip friction, and the power they take.
 
 A couple is given per unit mass, either by itself or per unit of the normal force.
 """
@@ -33,7 +33,7 @@ class Couple:
     needs_normal_force: bool = False
     """Whether k is per unit of the normal force."""
     about_normal: bool = False
-    """Whether it resists the spin alone; it is per unit of the normal force then."""
+    """Whether it resists the spin alone; it is then per unit of the normal force."""
     linear: bool = True
 
 

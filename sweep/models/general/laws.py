@@ -1,4 +1,4 @@
-"""Laws of slip friction beside the paper's: what a general body may slip on.
+"""Laws of slip friction for general bodies, besides the paper's.
 
 All laws are isotropic.  The friction force on the body is F = -N k(v²) v, with the slip velocity v of the contact point
 and the normal force N; a law is its resistance k.  It is a smooth function of v², also at v = 0, and is written without
@@ -26,7 +26,7 @@ class Law:
     """A law of friction."""
 
     name: str
-    """As in the names of models: the `law` of a configuration and, after a hyphen, its `regularisation`."""
+    """The name used in names of models: the `law` of a configuration and, after a hyphen, its `regularisation`."""
     parameters: tuple[str, ...]
     """Names of its physical parameters, which are its constants too."""
     resistance: Callable[..., Any]
@@ -44,7 +44,7 @@ class Law:
     """Parameters that are pure numbers here although `sweep.parameters` gives them a unit."""
 
     def both(self, square, spin_square, p):
-        """k and m of `coupled`, m being 0 of a law that does not depend on the spin.
+        """k and m of `coupled`; m is 0 for a law that does not depend on the spin.
 
         A user's law is called as a whole: its lines are those of its file.
         """
@@ -117,7 +117,7 @@ def _stribeck(square, p):
 
 
 _C = 3 * np.pi / 8
-"""Force over a circle where d is small, over d."""
+"""The force of `contensou` for small d, divided by d."""
 
 
 @inline
@@ -125,15 +125,15 @@ def over_circle(slip, turn):
     """Force and couple of dry friction over a circle under the pressure of Hertz, as shares of μ N and of μ N ε.
 
     Where the circle, of radius ε, slips by v and turns by ε n at its rim, each of its points slips by itself.  The
-    force is the gradient of Φ(d), the mean distance of its points, weighed with their pressure, from the one at rest,
+    force is the gradient of Φ(d), the mean distance of its points, weighted with their pressure, from the one at rest,
     at d = v/(ε n); the couple is Φ - d Φ'.  As ∇²|x| = 1/|x|, ∇²Φ is the potential of the pressure, which inside the
     circle is 3π/8 (2 - d²).  So, with C = 3π/8,
 
         d <= 1:  force C (d - d³/4),  couple C/16 (8 - 8 d² + 3 d⁴);
         d >= 1:  force 1 - 1/(10 d²) - …,  couple 1/(5 d) + ….
 
-    Polynomials in x = 1/d², of exact value and slope at both ends, stand for the two series, with errors of 1.2e-4.  Of
-    t = min(d, 1) and x = min(1/d², 1) one is 1 always; what is made of it is then zero or constant.
+    Polynomials in x = 1/d², of exact value and slope at both ends, stand for the two series, with errors of 1.2e-4.
+    Either t = min(d, 1) or x = min(1/d², 1) is always 1; what is computed from it is then zero or constant.
 
     Returns
     -------

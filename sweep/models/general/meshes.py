@@ -17,13 +17,14 @@ _LARGEST = 1e9
 _LOWEST = 0.1
 """The share of the height in which the surface is fitted."""
 _SAME = 1e-6
-"""Distance at which corners are the same, as a share of the longest size."""
+"""Distance below which corners count as the same, as a share of the longest size."""
 _LINES, _OVERLAP = 400, 1e-3
 """Lines along which shells are counted, and the share of the volume in which they may overlap."""
 
 
 def triangles(stl: bytes) -> NDArray[np.float64]:
-    """Return the corners in a binary or ASCII STL file, shape (triangles, 3, 3); a ValueError says what it is not."""
+    """Return the corners in a binary or ASCII STL file, shape (triangles, 3, 3); a ValueError if the file is not
+    one."""
     if len(stl) >= _HEADER and len(stl) == _HEADER + _RECORD.itemsize * int.from_bytes(stl[80:_HEADER], "little"):
         found = np.frombuffer(stl, _RECORD, offset=_HEADER)["corners"].astype(float)
     else:
@@ -78,8 +79,8 @@ def mesh(corners: NDArray[np.float64]) -> Mesh:
 def _check_closed(corners: NDArray[np.float64]) -> None:
     """Raise a ValueError unless each edge belongs to two triangles, in opposite senses.
 
-    Corners of one place may differ in their last digits.  They are the same where they round to one place of a grid,
-    or else of one that is shifted, since few lie where both part.
+    Corners at the same place may differ in their last digits.  They count as the same if they round to the same
+    point of a grid, or of a shifted one, since few lie where both grids separate them.
     """
     places = corners.reshape(-1, 3) / (_SAME * np.ptp(corners, axis=(0, 1)).max())
     for shift in (0, 1 / 3, 2 / 3):
@@ -97,11 +98,11 @@ def _check_closed(corners: NDArray[np.float64]) -> None:
 
 
 def _open_edges(corner: NDArray[np.int64]) -> tuple[int, int, int]:
-    """Count the edges of triangles, whose corners are numbers, that are not of two triangles in opposite senses.
+    """Count the edges, given by pairs of corner numbers, that do not belong to two triangles in opposite senses.
 
-    They are of one triangle alone, of more than two, or of two that run through it in the same sense.
+    They belong to one triangle alone, to more than two, or to two that pass along them in the same sense.
     """
-    corner = corner[(corner != np.roll(corner, 1, 1)).all(1)]  # of which two are the same, they have no area
+    corner = corner[(corner != np.roll(corner, 1, 1)).all(1)]  # triangles with two equal corners have no area
     edges = np.stack([corner, np.roll(corner, -1, 1)], -1).reshape(-1, 2)
     forward = edges[:, 0] < edges[:, 1]
     _, which = np.unique(np.sort(edges, 1), axis=0, return_inverse=True)
@@ -145,9 +146,9 @@ def _standing(volume: float, second: NDArray[np.float64], points: NDArray[np.flo
     (k1, k12, k2, flat, *slope, shift), _, rank, _ = np.linalg.lstsq(terms, 2 * h, rcond=None)
     curvatures, axes = np.linalg.eigh([[k1, k12], [k12, k2]])
     if rank < terms.shape[1] or curvatures[0] <= 0:
-        raise ValueError("no rounded lowest point; turn the shape as it stands on a table, z up, or make it finer")
+        raise ValueError("no rounded lowest point; stand the shape upright, z up, or use smaller triangles")
     if np.hypot(*np.linalg.solve([[k1, k12], [k12, k2]], slope)) > 0.02 * np.ptp(points[:, :2], axis=0).max():
-        raise ValueError("centre of mass not above the lowest point; turn the shape as it stands on a table, z up")
+        raise ValueError("centre of mass not above the lowest point; stand the shape upright, z up")
     depth = -bottom - shift / 2
     c = 1 / np.clip(flat, _LOWEST / height, 1 / depth)
     along, _ = axes.T
@@ -158,7 +159,7 @@ def _standing(volume: float, second: NDArray[np.float64], points: NDArray[np.flo
 
 
 def body(solid: Mesh, measured: Numbers) -> dict[str, Any]:
-    """Return the parameters of the section `body` of a solid whose `mass` or `density` is measured, all in SI units."""
+    """Return the parameters of the section `body` for a solid whose `mass` or `density` is known, all in SI units."""
     mass = mass_of(measured, solid.volume)
     matrix = np.trace(solid.second) * np.eye(3) - solid.second
     places = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}

@@ -22,8 +22,8 @@ inverse of the stiffness, which is diagonal.  These two sums give e1 e2 for each
 
 with the (M⁻¹)_12 = (1/M_1 - 1/M_2) sin(2 ξ)/2 of the moments of inertia M_1, M_2 of the two oscillations and the
 angle ξ between their axes and those of the curvature.  So it is a product of misalignment, difference of the inverse
-moments, difference of the radii and squared frequency, as Kondo and Nakanishi say of theirs; and the σ are as the
-squared frequencies, with opposite signs.
+moments, difference of the radii and squared frequency, as Kondo and Nakanishi say of theirs; and the two σ are
+proportional to the squared frequencies, with opposite signs.
 
 The time.  Where only the growing mode counts, (n - n_c)² + 2 E/J = N² is conserved, n_c being the spin at which the
 mode neither grows nor decays: zero without friction, the critical spin of (abdot) with it.  So
@@ -32,7 +32,7 @@ mode neither grows nor decays: zero without friction, the critical spin of (abdo
     t_r = [asinh((n0 - n_c)/sqrt(2 E0/J)) + artanh(n_c/N)] / (|σ| N)
 
 for n0 > 0, and by reflection for n0 < 0.  With n_c = 0 this is Garcia and Hubbard's time, log((N + n0)/(N - n0)) over
-2 |σ| N.  Neglected are the other mode, which decays, and all that is of higher order in n0/ν and in the rattle.
+2 |σ| N.  This neglects the other mode, which decays, and all terms of higher order in n0/ν and in the rattle.
 
 Only the abstracts of the two papers were at hand, not their numbered equations: the derivation is ours.
 """
@@ -50,7 +50,7 @@ from sweep.models.theory.rocking import frequencies
 PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
 REASONS = dict(enumerate(("predicted", "no_coupling", "no_spin", "no_rattle", "no_reversal", "not_known")))
 """Whether there is a time, and why not: nothing couples spin and rattle; there is no spin to reverse; the mode that
-would grow has no energy; friction stops the reversal; or body or friction have what the formula does not know."""
+would grow has no energy; friction stops the reversal; or the formula does not cover the body or its friction."""
 
 
 def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
@@ -62,7 +62,7 @@ def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array
     lower, higher = frequencies(rigid_body.rocking(columns, surface))
     with np.errstate(divide="ignore", invalid="ignore"):
         shared = h * (k1 - k2) * coupling / (2 * (higher**2 - lower**2))
-    # Of a body that is round both ways the modes are arbitrary, and nothing is coupled.
+    # If a body is round in both directions, the modes are arbitrary, and nothing is coupled.
     shared = np.where((k1 == k2) | (coupling == 0), 0.0, shared)
     return shared * lower**2, -shared * higher**2
 

@@ -5,8 +5,8 @@ that J12 = 0.  They are turned about z by an angle α against the axes of the su
 inertia is given by δ, α = δ.  u is the upward normal of the plane.  J is the matrix of inertia about G divided by the
 mass.  The equations hold in any units: gravity g is one of the constants.
 
-Functions of constants take those that `constants` gives, or those of a scene (`sweep.models.general.common`), where
-what vanishes is the number 0.
+Functions of constants take those from `constants`, or those of a scene (`sweep.models.general.common`), in which
+whatever vanishes is the number 0.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ BODY = ("g", *INERTIA, *INVERSE, *DIFFERENCES)
 
 MOMENTS = ("Ixx", "Iyy", "Izz")
 PRODUCTS = ("Ixy", "Ixz", "Iyz")
-"""Elements of the matrix of inertia, as parameters.  Either all of `MOMENTS` are given, or none of either."""
+"""Elements of the matrix of inertia, as parameters.  Either all of `MOMENTS` are given, or no element at all."""
 
 PARAMETERS = ("a", "b", "c", "offset", "delta", "mass", *MOMENTS, *PRODUCTS, "gravity")
 """All parameters of a body.  `delta` and the elements of inertia exclude each other; mass and gravity belong to SI."""
@@ -77,7 +77,7 @@ def about_surface(columns: Columns) -> tuple[Array, ...]:
 
 
 def axes(columns: Columns) -> Array:
-    """α, shape (cells,): at most 45 degrees to either side where moments of inertia are given."""
+    """α, shape (cells,): within ± 45 degrees where moments of inertia are given."""
     if MOMENTS[0] not in columns:
         return columns["delta"]
     J11, J22, _, J12, _, _ = about_surface(columns)
@@ -136,7 +136,7 @@ def matrix(elements: tuple[Array, ...]) -> Array:
 
 
 def height(columns: Columns) -> Array:
-    """How high G is above the plane at upright rest, shape (cells,)."""
+    """Height of G above the plane at upright rest, shape (cells,)."""
     return columns["c"] - offset(columns)
 
 
@@ -230,7 +230,7 @@ def contact_on(surface: Surface):
 def energy_on(surface: Surface):
     """(states of `slip`, constants) -> (spin n, energy of the rattle, J33), per unit mass.
 
-    E = ωᵀJω/2 + |v_g|²/2 + g height is split by means of ω = n u + o, o ⊥ u.  Every term except J33 n²/2 is quadratic
+    E = ωᵀJω/2 + |v_g|²/2 + g height is split using ω = n u + o, o ⊥ u.  Every term except J33 n²/2 is quadratic
     in small quantities and is computed as such: no difference of numbers of order one is taken.  But if J13 or J23 does
     not vanish, one term is n² times a small quantity.
     """

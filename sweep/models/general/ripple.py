@@ -7,10 +7,10 @@ at n = 0, to second order in the rattle,
     M · u = J33 n + P,   P = Σ u_i ((J_ii + h² - J33) δ_ij - h S_ij) ω_j.
 
 P is a ripple.  The right-hand side of the first line and P become forms of u and the angular momentum M about the
-contact point, which is not affected by friction, and the rest is as it is there.
+contact point, which is not affected by friction, and the rest follows as there.
 
-If the third axis of the surface is no axis of inertia, the spin ripples in first order too: n = (M · u + J13 ω1 + J23
-ω2) / J33.  Only this ripple is taken away then.
+If the third axis of the surface is not an axis of inertia, the spin ripples in first order too: n = (M · u + J13 ω1 +
+J23 ω2) / J33.  Then only this ripple is removed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MOMENTUM = ("P1", "P2", "h", "R11", "R12", "R22")
 """Coefficients of M = P ω + h (v2, -v1) + ω3 R u, to first order in the rattle, with R = h S."""
 
 TURN = ("turn1", "turn2", "W11", "W12", "W22")
-"""J13 / J33, J23 / J33, and the inverse of P without spin: of bodies whose third axis is no axis of inertia."""
+"""J13 / J33, J23 / J33, and the inverse of P without spin, for bodies whose third axis is not an axis of inertia."""
 
 
 def of_velocities(surface: Surface, *, skew: bool) -> Ripple:
@@ -49,7 +49,7 @@ def of_velocities(surface: Surface, *, skew: bool) -> Ripple:
 
 
 def of_momenta(surface: Surface, *, skew: bool) -> Ripple:
-    """The same from the states of `sweep.models.stiff.form`."""
+    """The ripple of the spin from the states of `sweep.models.stiff.form`."""
 
     @inline
     def skew_value(y, p, k):

@@ -1,8 +1,8 @@
 """The inertia of homogeneous solids: an ellipsoid, and the lower half of one, flat on top.
 
-With the semi-axes A, B and C, both have about the ellipsoid's centre the matrix of inertia
-m diag(B² + C², A² + C², A² + B²)/5, as halves are mirror images.  The centre of mass of the half lies 3C/8 below it
-(E. W. Weisstein, "Ellipsoid" and "Hemisphere", mathworld.wolfram.com).
+About the ellipsoid's centre and with the semi-axes A, B and C, both have the matrix of inertia
+m diag(B² + C², A² + C², A² + B²)/5, because the halves are mirror images.  The centre of mass of the half lies 3C/8
+below it (E. W. Weisstein, "Ellipsoid" and "Hemisphere", mathworld.wolfram.com).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def body(measured: Numbers, *, whole: bool) -> dict[str, Any]:
     """Return the parameters of the section `body`, from what is measured; both in SI units.
 
     The solid has the sizes `length`, `width` and `height`, and its surface the semi-axes `a`, `b` and `c`, or the radii
-    of curvature `radius_long` and `radius_short`.  What is not given of one is as the other has it.  The inertia is
-    turned by `angle` against the surface, as by the parameter `delta`.
+    of curvature `radius_long` and `radius_short`.  Missing dimensions of the solid default to those of the surface, and
+    vice versa.  The inertia is turned by `angle` against the surface, as by the parameter `delta`.
 
     Parameters
     ----------
@@ -51,12 +51,12 @@ def body(measured: Numbers, *, whole: bool) -> dict[str, Any]:
 
 
 def mass_of(measured: Numbers, volume):
-    """Return the mass that was measured, or that of the density."""
+    """Return the measured mass, or the one that follows from the density."""
     return measured["mass"] if "mass" in measured else measured["density"] * volume
 
 
 def propagated(formula: Callable[[Numbers], Numbers], values: Numbers, errors: Numbers) -> dict[str, float]:
-    """Return the errors of what `formula` makes of `values` whose `errors` are independent, to first order.
+    """Propagate independent `errors` of `values` through `formula`, to first order.
 
     Derivatives are by a complex step, which does not round (W. Squire and G. Trapp, SIAM Rev. 40, 110-112, 1998).
     """

@@ -1,6 +1,6 @@
 """How a general body is set off: from a point of contact, or by angles, angular velocity and slip.
 
-The parameters tell which: with `n0` the start is the paper's, without it that by angles.
+The parameters decide: with `n0` the start is the paper's, otherwise it is given by angles.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def spin(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
 
 
 def slipping(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, ...]:
-    """As `rolling`, and the slip v1 and v2, all in the axes of the states.
+    """As `rolling`, with the slip v1 and v2 as well, all in the axes of the states.
 
     `slip1` and `slip2` are components along the ground: along the direction that x has, seen from above, when the body
     is turned from upright first by `roll` about x and then by `pitch` about y, and across it.

@@ -54,23 +54,24 @@ class Surface:
     stiffness: Callable[..., Any]
     """(constants) -> (k11, k12, k22, h): the second derivatives of that by u1 and u2 at rest, and the height there."""
     normal: Callable[[Columns, Array, Array], tuple[Array, Array, Array]]
-    """(columns, x, y) -> u for the contact point at x and y, which has to be one; all in the axes of the surface."""
+    """(columns, x, y) -> u for a possible contact point at x and y; all in the axes of the surface."""
     homogeneous: bool
     """Whether the inertia is that of a homogeneous body unless it is given."""
     interior: str
-    """Where the centre of mass has to lie, and what to do if it does not, in words."""
+    """Words for messages: where the centre of mass has to lie, and what to change."""
     outside: Callable[[Columns], Array]
-    """(columns) -> whether it lies elsewhere, shape (cells,)."""
+    """(columns) -> whether the centre of mass lies elsewhere, shape (cells,)."""
     bounds: str
-    """For which offsets upright rest is stable, in words."""
+    """Words for messages: the offsets for which upright rest is stable."""
     off: Callable[[Columns, Array, Array], Array] = lambda columns, x, y: np.zeros(np.shape(x), bool)
-    """(columns, x, y) -> whether no point of it lies at x and y, shape (cells,); by default some does anywhere."""
+    """(columns, x, y) -> whether the surface has no point at x and y, shape (cells,); by default it has one
+    everywhere."""
     outline: str = ""
-    """What holds of x and y within it, in words."""
+    """Words for messages: the condition on x and y within the outline."""
     required: frozenset[str] = frozenset()
-    """Parameters that have to be given, because their defaults in `sweep.parameters` are of an ellipsoid."""
+    """Parameters that have to be given, because their defaults in `sweep.parameters` are for an ellipsoid."""
     meanings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
-    """Fields of a `Parameter` that differ from those in `sweep.parameters`, which are of an ellipsoid."""
+    """Fields of a `Parameter` that differ from those in `sweep.parameters`, which describe an ellipsoid."""
 
 
 def offset(columns: Columns) -> Array:

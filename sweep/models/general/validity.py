@@ -1,4 +1,4 @@
-"""Find bodies of `sweep.models.general.rigid_body` that cannot be, or do not stand upright at rest, and say why."""
+"""Find bodies of `sweep.models.general.rigid_body` that are impossible or cannot stand upright, and say why."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _ROUNDING = 1e-12
 
 
 def impossible(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
-    """Tell which bodies cannot be or do not stand, shape (cells,)."""
+    """Find the bodies that are impossible or cannot stand, shape (cells,)."""
     return np.asarray(np.any([bad for bad, _ in wrongs(columns, surface)], axis=0))
 
 
 def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Array, str]]:
-    """Yield everything that may be wrong: for which bodies it is, shape (cells,), and, in words, what to do."""
+    """Yield each possible fault: the bodies that have it, shape (cells,), and a sentence on what to do."""
     yield surface.outside(columns), f"centre of mass outside {surface.interior}"
     moments = np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inertia(columns)))
     yield moments[:, 0] <= 0, "matrix of inertia not positive definite; all three principal moments must be positive"

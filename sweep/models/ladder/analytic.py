@@ -28,7 +28,7 @@ def critical_spins(columns: Columns) -> tuple[Array, Array]:
 def reversal_count(columns: Columns) -> Array:
     """n_r, the number of reversals predicted from the start spin n0: integers, shape (cells,).
 
-    By the inequalities (nrk0) and (nrk1), each reversal takes 2 |n_c1| from the spin, with the n_c1 of
+    By the inequalities (nrk0) and (nrk1), each reversal takes 2 |n_c1| from the spin, where n_c1 belongs to
     the side on which the spin is.  So n_r is the number of partial sums of the alternating |n_c2|,
     starting on the side of n0, that |n0| exceeds.  Cases (I) and (II) differ only in that side.  The
     closed forms (nr1) and (nr2) are undefined where x is an integer, and are not used.
@@ -56,7 +56,7 @@ def best_b(a: float, c: float = 1.0) -> float:
 
 MODEL = Tier(
     name="analytic",
-    summary="the count by formula, nothing is simulated (Takano 2011, nrk0, nrk1)",
+    summary="the count by formula, without simulation (Takano 2011, nrk0, nrk1)",
     parameters=("a", "b", "c", "delta", "mu", "n0"),
     offers=frozenset({COUNT, FORMULAS}),
 )

@@ -5,8 +5,8 @@ They are those of Takano (2011, ndotab, abdot):
     I3 n' = -k1 A²/2 + k4 B²/2,   A' = -a1 A / 2,   B' = -a4 B / 2,   a1 = m1 - n k1,   a4 = m4 + n k4
 
 For a start at X0, Y0 the amplitudes are A = sqrt(ν1² + 1) X0 and B = sqrt(ν2² + 1) Y0.  The paper's (abdef) has
-ν² - 1 instead, and x0 in place of Y0.  But the average of k1 (X X'' - X²) that it takes is
--k1 (ν1² + 1) X0² / 2, and only with that sign do the effective equations tend to these.  Without friction
+ν² - 1 instead, and x0 in place of Y0.  But the average that it takes, of k1 (X X'' - X²), is
+-k1 (ν1² + 1) X0² / 2, and the effective equations tend to these only with that sign.  Without friction
 N² + A² + B², with N = sqrt(I3) n, and A^γ B, with γ = k4/k1, are conserved.
 """
 

@@ -1,7 +1,7 @@
 """Rolling without slip: the limit of infinite friction.  Without couples energy is conserved.
 
 The unknowns (u1, u2, ω1, ω2, ω3) are those of `slip` without the slip velocity: the contact point is at rest,
-v_g = v_0 = x_p × ω, and the contact force, per unit mass F = v_g' + ω × v_g + g u, is whatever keeps it so.  With
+v_g = v_0 = x_p × ω, and the contact force, per unit mass F = v_g' + ω × v_g + g u, is whatever keeps it at rest.  With
 s = v_0 - x_p' and a couple τ0 + R τ1, eliminating this force gives
 
     J_P ω' = x_p × (g u + ω × s) + τ0 + R τ1 - ω × J ω,   J_P = J + |x_p|² - x_p x_pᵀ,

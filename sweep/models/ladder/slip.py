@@ -1,7 +1,7 @@
 """The full model: a body that slips on the plane with friction (Takano 2011, Ldot … visf).
 
 The paper's body is a homogeneous ellipsoid with viscous friction.  Any other rigid body, law of friction and couple
-obeys the same equations (`sweep.models.general`), and what a scene does not have leaves no instruction in its kernel.
+obeys the same equations (`sweep.models.general`), and whatever a scene lacks adds no instruction to its kernel.
 
 The unknowns (u1, u2, ω1, ω2, ω3, v1, v2) are components of the upward normal u, the angular velocity ω and the slip
 velocity v_p of the contact point, along axes fixed in the body (`sweep.models.general.rigid_body`).  All of them except
@@ -115,7 +115,7 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         }
 
     linear = law.linear_to is None
-    # A couple slows the spin of a body that does not rattle, which neither leaps nor the slow equations allow for.
+    # A couple slows the spin of a body that does not rattle; leaps and the slow equations do not allow for that.
     modes = law == VISCOUS and not couples and not variant.skew
     return Model(
         **of_any_body(variant),
@@ -140,7 +140,7 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
 
 
 def _with_and_without(law: Law):
-    """As a law that saturates leaves the body free when it slips fast, motions without friction matter as well."""
+    """A law that saturates leaves the body free when it slips fast, so motions without friction matter as well."""
 
     def extremes(columns: Columns) -> tuple[Columns, ...]:
         free = {name: 0 * columns[name] for name in law.parameters if name.startswith("mu")}

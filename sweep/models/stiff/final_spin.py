@@ -1,11 +1,12 @@
-"""What becomes of a small rattle that is left to itself: the slow equations.
+"""The slow equations, which give the further course of a small rattle that is left to itself.
 
 A mode of energy E_k = J33 e_k / 2 grows at the rate r_k of the linear theory and changes the spin by (ndotab, abdot),
 
     e_k' = 2 r_k(n) e_k,   n' = -Σ s_k(n) e_k,
 
-with r_k and s_k of the full model (`sweep.models.stiff.modes`) at five spins, and polynomials between them.  What this
-neglects is of the order of `bending` times n² + Σ e_k, and grows where the two modes meet, as in nearly round bodies.
+with r_k and s_k of the full model (`sweep.models.stiff.modes`) at five spins, and polynomials between them.  The
+neglected terms are of the order of `bending` times n² + Σ e_k, and grow where the two modes meet, as in nearly round
+bodies.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from sweep.models.theory.linear import NODES, through_nodes
 # The fastest spin within reach, in units of the spin whose energy is there.
 _REACH = 1.02
 
-# Ratio of the difference of the two frequencies to the rates, below which the modes do not act each for itself: of
+# Ratio of the difference of the two frequencies to the rates, below which the modes do not act independently: of
 # settled cells of the wide domain above it, none was off by more than 1 % of the spin.
 _APART = 5.0
 
@@ -40,12 +41,12 @@ _OVER, _MOST_STEPS = 1e-3, 5000
 
 
 class Ending(NamedTuple):
-    """How trajectories end; arrays of shape (cells,), NaN where the slow equations do not tell."""
+    """How trajectories end; arrays of shape (cells,), NaN where the slow equations do not apply."""
 
     spin: Array
-    """The spin that stays, in sqrt(g/c)."""
+    """The spin that remains, in sqrt(g/c)."""
     reversals: Array
-    """How often the spin reverses on the way."""
+    """Number of reversals until then."""
     overshoot: Array
     """Largest |spin| since the last reversal, or since the beginning."""
     nearest_approach: Array
@@ -53,7 +54,7 @@ class Ending(NamedTuple):
 
 
 def ending(form: StiffForm, states: Array, constants: Any) -> Ending:
-    """How a small rattle ends; the spin is without its ripple.
+    """Find how a small rattle ends; the spin is taken without its ripple.
 
     Parameters
     ----------

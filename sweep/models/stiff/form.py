@@ -1,4 +1,4 @@
-"""Says what the stiff method needs of a model: its equations in variables in which only the slip is stiff.
+"""Define what the stiff method needs from a model: its equations in variables in which only the slip is stiff.
 
 The angular momentum M about the contact point takes the place of ω.  Forces at the contact point have no torque about
 it, so neither friction nor the normal force appears in u' and M'.  See `sweep.models.stiff.slip`.
@@ -20,10 +20,10 @@ STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
 
 
 Geometry = namedtuple("Geometry", "u3 x y z t1 t2 v3 w1 w2 w3 du1 du2 du3 s1 s2 s3 q1 q2 q3")
-"""What `slow` computes on its way and `newton` needs as well; components along the axes of the states.
+"""Intermediate results of `slow` that `newton` needs as well; components along the axes of the states.
 
-They are of u; the contact point x_p = (x, y, z); t = u/u3, so that v3 = -(t1 v1 + t2 v2); v_p; ω; u'; s = v_0 - x_p';
-and q = u × x_p.
+They belong to u; the contact point x_p = (x, y, z); t = u/u3, so that v3 = -(t1 v1 + t2 v2); v_p; ω; u'; s = v_0 -
+x_p'; and q = u × x_p.
 """
 
 
@@ -32,9 +32,9 @@ class StiffForm:
     """A model with slip in the variables `STATES`."""
 
     full: Model
-    """The model as the configuration names it."""
+    """The model under its name in the configuration."""
     model: Model
-    """The same in these variables; it has the same constants p."""
+    """The same model in these variables; it has the same constants p."""
     momentum: Callable[..., Any]
     """Inline, (states of `full`, p) -> states."""
     slow: Callable[..., Any]
@@ -61,7 +61,7 @@ class StiffForm:
 def in_momentum(full: Model, momentum, slow, ripple: Ripple) -> Model:
     """The model `full` in the variables `STATES`, without the functions that take its own states.
 
-    The other arguments are as of `StiffForm` and `Model`.
+    The other arguments are those of `StiffForm` and `Model`.
     """
     full_energy = full.energy
 
@@ -85,7 +85,7 @@ def in_momentum(full: Model, momentum, slow, ripple: Ripple) -> Model:
 
 
 def no_rhs(y, p):
-    """Stand for the right-hand side that a model in `STATES` does not have."""
+    """Stand in for the right-hand side, which a model in `STATES` does not have."""
     raise NotImplementedError("a stiff method takes `slow` and `newton`, not a right-hand side")
 
 

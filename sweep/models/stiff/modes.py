@@ -9,7 +9,7 @@ M3 - Σ B_jk z_j z_k / (λ_j + λ_k) remains constant, whatever becomes of the z
 
 By the averaged equations (ndotab, abdot), a mode of energy E_k changes the spin by d α²/2 in total while it decays or
 grows, where d is the distance of n from the critical spin of the mode, and α = sqrt(2 E_k / J33)/d is called the *size*
-of the mode.  Neglected are terms of order α⁴ d in spin, and terms of order α_j³ by which mode j changes the other.
+of the mode.  This neglects terms of order α⁴ d in spin, and terms of order α_j³ by which mode j changes the other.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RATTLE = (0, 1, 2, 3, 5, 6)
 # Decay rate of the slip, in sqrt(g/h), above which friction counts as stopping the slip fast compared with the rattle.
 _SLIP_DECAY = 0.3
 
-# Amplitude at which quadratic forms are evaluated: the terms that they leave out are 1e-16 of them.
+# Amplitude at which quadratic forms are evaluated: the neglected terms are 1e-16 of them.
 _SMALL = 1e-8
 
 
@@ -48,8 +48,8 @@ class Rattle:
     modes: Array
     """Right eigenvectors R as columns, shape (cells, 6, 2)."""
     readings: Array
-    """The matrix in z = readings (u1, u2, M1, M2), shape (cells, 2, 4).  It does without the slip, because it is also
-    applied to derivatives, and a history has none of the slip."""
+    """The matrix in z = readings (u1, u2, M1, M2), shape (cells, 2, 4).  It does not use the slip, because it is
+    also applied to derivatives, and a history has no derivative of the slip."""
     amplitudes: Array
     """Amplitudes z, shape (cells, 2)."""
     unit_energies: Array
@@ -65,7 +65,7 @@ class Rattle:
 
     @classmethod
     def of(cls, form: StiffForm, states: Array, constants: Any) -> Rattle:
-        """Resolve states of `form`, shape (7, cells), all of which except the spin have to be small."""
+        """Resolve states of `form`, shape (7, cells), into modes; all states except the spin have to be small."""
         spin, _, inertia = form.model.energy(states, constants)
         rates, modes, sound = _rocking(form, constants, spin)
         pairs = np.concatenate([modes[:, :4], modes[:, :4].conj()], axis=2)
@@ -79,7 +79,7 @@ class Rattle:
         return cls(sound, rates, modes, readings, amplitudes, unit, slopes, upright, form, constants)
 
     def select(self, cells: Array) -> Rattle:
-        """The rattles of the cells given by a mask or by indices."""
+        """Select the rattles of the cells given by a mask or by indices."""
         arrays = {f.name: getattr(self, f.name)[cells] for f in fields(self) if f.name not in ("form", "constants")}
         return Rattle(form=self.form, constants=take(self.constants, cells), **arrays)
 
@@ -111,16 +111,16 @@ class Rattle:
         return np.asarray(2 * (self.modes @ ((factors - 1) * amplitudes)[..., None])[..., 0].real)
 
     def turn(self, amplitudes: Array) -> Array:
-        """M3' of a rattle with these amplitudes, shape (cells,)."""
+        """M3' for a rattle with these amplitudes, shape (cells,)."""
         return _form(self.turning, amplitudes)
 
     def rippled(self, amplitudes: Array) -> Array:
-        """The part of M3 that ripples with a rattle of these amplitudes, shape (cells,): without the slow change."""
+        """The ripple of M3 due to a rattle of these amplitudes, without the slow change, shape (cells,)."""
         slow = np.roll(np.eye(4, dtype=bool), 2, axis=1)  # a mode and its own conjugate
         return _form(np.where(slow, 0, self._turned), amplitudes)
 
     def turned(self, amplitudes: Array) -> Array:
-        """The part of M3 that comes and goes with a rattle of these amplitudes, shape (cells,)."""
+        """The part of M3 that appears and vanishes with a rattle of these amplitudes, shape (cells,)."""
         return _form(self._turned, amplitudes)
 
     @property
@@ -137,7 +137,7 @@ def slow_rates(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Arr
 
 
 def bending(model: Model, columns: Columns) -> Array:
-    """Bound on how strongly a rattle of e = 2 E / J33 = 1 makes the motion nonlinear, shape (cells,).
+    """Bound on how nonlinear a rattle of e = 2 E / J33 = 1 makes the motion, shape (cells,).
 
     The measure is its part in the normal force.  For rocking about one axis R - g = k φ'² with φ'² = J33 e / (J + h²),
     the stiffness k and the height h of the centre of mass.
@@ -164,8 +164,8 @@ def fastest_growth(model: Model, columns: Columns, reach: Array) -> Array:
 def _rocking(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array, Array]:
     """Rates and modes, as in `Rattle`, and whether there are two rocking modes, shape (cells,)."""
     rates, modes = np.linalg.eig(linear.jacobian(form.full, constants, spin))
-    # With little friction the slip is not stopped fast, but oscillates slowly, and these two modes do not describe
-    # that: at μ = 1e-3 leaving it out cost 3e-7 in spin.
+    # With little friction the slip is not stopped fast, but oscillates slowly, which these two modes do not describe:
+    # at μ = 1e-3 neglecting it cost 3e-7 in spin.
     falling = np.argsort(-rates.imag, axis=1)
     fast = np.take_along_axis(rates.real, falling[:, 2:4], axis=1) < -_SLIP_DECAY * form.unit(constants)[:, None]
     order = falling[:, 1::-1]

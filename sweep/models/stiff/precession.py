@@ -1,4 +1,4 @@
-"""How a rattle that rolls round and round winds down.
+"""How a circular rattle decays.
 
 The two rocking frequencies of a nearly round body are nearly the same, and its rattle becomes circular: the contact
 point runs round and round, and neither the spin nor the rattle ripples.  Only the little slip that such a motion needs
@@ -8,8 +8,8 @@ momentum about it along the vertical,
 
     d (M·u)/dt = h (S12 (ω1² - ω2²) - (S11 - S22) ω1 ω2),
 
-changes by what averages to zero while the contact point goes round (docs/explanation/reversal.md).  M·u/J33 is where
-the spin goes while the rattle decays.
+changes by an amount that averages to zero while the contact point goes round (docs/explanation/reversal.md).  The spin
+tends to M·u/J33 while the rattle decays.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from sweep.jit import inline
 
 @inline
 def vertical_spin(y, spin, rattle, inertia):
-    """The spin M·u/J33 that would be left without rattle, and the spin that would have all the energy, squared.
+    """The spin M·u/J33 that would remain without rattle, and the square of the spin that would hold all the energy.
 
-    `y` are the states of `stiff.slip`, and the others what its `energy` gives.  The results are in sqrt(g/c) and g/c.
-    The second, less the square of the first, is the energy that a rattle can lose; of the three it alone has no ripple.
+    `y` are the states of `stiff.slip`, and the other arguments are the results of its `energy`.  The results are in
+    sqrt(g/c) and g/c. The second, less the square of the first, is the energy that a rattle can lose; it is the only
+    one of the three without ripple.
     """
     u1, u2, M1, M2, M3, _, _ = y
     vertical = (u1 * M1 + u2 * M2 - np.sqrt(1.0 - u1 * u1 - u2 * u2) * M3) / inertia

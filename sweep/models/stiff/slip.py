@@ -15,7 +15,7 @@ Newton step.  The motion is the same as in `slip`.
 
 With x_p = -a/ρ the matrix ρ² J_P needs no quotient, so that a single division yields 1/ρ, 1/u3 and J_P⁻¹.
 
-A couple in proportion to the normal force would make M' stiff too: there is no stiff form then.
+A couple proportional to the normal force would make M' stiff too: there is then no stiff form.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from sweep.models.vectors import Symmetric, Vector
 
 
 def has_form(model: Model) -> bool:
-    """Whether a model has a stiff form: slip models do, but not a user's.
+    """Return whether a model has a stiff form: slip models do, users' models do not.
 
     The law has to be viscous.  A step that may be long compared with the decay of the slip is of use only where the
-    slip remains at the value that follows from the slow motion.  With the other laws slip sets in and ends within times
-    that dopri5's steps are short enough for.
+    slip remains at the value that follows from the slow motion.  With the other laws slip begins and ends within times
+    that dopri5 resolves anyway.
     """
     of = model.variant
     if model.origin or of is None or of.law != VISCOUS:
@@ -49,7 +49,7 @@ def has_form(model: Model) -> bool:
 
 
 def form_of(model: Model) -> StiffForm:
-    """The stiff form of a model that has one."""
+    """Make the stiff form of a model for which there is one."""
     return _form_of(model.variant)
 
 

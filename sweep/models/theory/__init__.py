@@ -1,1 +1,1 @@
-"""Says what follows from a model without running it: linear theory, rocking, ripple, the paper's coefficients."""
+"""Derive what follows from a model without running it: linear theory, rocking, ripple, the paper's coefficients."""

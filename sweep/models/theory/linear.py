@@ -1,6 +1,6 @@
 """A small rattle about steady upright spin, from the right-hand side of a model itself.
 
-At constant n it obeys a linear system.  At which spins it grows is in `sweep.models.theory.stability`.
+At constant n it obeys a linear system.  `sweep.models.theory.stability` finds the spins at which it grows.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def growth_rate(model: Model, constants, spin: Array) -> Array:
 
 
 def resting_spin(model: Model, constants, states: Array) -> Array:
-    """Return the spin that stays when the rattle has decayed at its present rates, in sqrt(g/c), shape (cells,).
+    """Return the spin that remains when the rattle has decayed at its present rates, in sqrt(g/c), shape (cells,).
 
     With the rattle x in the modes of x' = A x, and the spin's state changing by the quadratic form Q of x, the integral
-    of Q is -Σ Q_jk z_j z_k/(λ_j + λ_k) over all pairs of modes: exact to second order in x, but for the change of A
+    of Q is -Σ Q_jk z_j z_k/(λ_j + λ_k) over all pairs of modes: exact to second order in x, except for the change of A
     with the spin.  NaN where a mode does not decay.
 
     Parameters
@@ -92,7 +92,7 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
     """Largest |λ| of the rattle at the fastest spins within reach, leaving out the fast decay due to friction.
 
     This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.  A model
-    may tell it itself.
+    may define it itself.
     """
     if model.fastest_motion:
         return model.fastest_motion(columns)
@@ -110,9 +110,9 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
 
 
 def fastest_spin(model: Model, columns: Columns) -> Array:
-    """The |spin| that a trajectory would reach if all its energy went into it, in sqrt(g/c), shape (cells,).
+    """The |spin| that a trajectory would reach if all its energy went into the spin, in sqrt(g/c), shape (cells,).
 
-    It is 0 where that energy is less than at rest.
+    It is 0 where the energy is less than at rest.
     """
     spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
     return np.asarray(np.sqrt(np.maximum(spin**2 + 2 * rattle / inertia, 0.0)))
@@ -121,7 +121,7 @@ def fastest_spin(model: Model, columns: Columns) -> Array:
 NODES = np.array([0.0, -1.0, 1.0, -0.5, 0.5])
 """Spins through which `through_nodes` fits a polynomial, in units of the fastest spin within reach.
 
-With three, rates were off by half at b = 6, where the modes nearly meet.
+With three spins, rates were off by half at b = 6, where the modes nearly meet.
 """
 
 _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
@@ -130,6 +130,6 @@ _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 def through_nodes(values: Array) -> Array:
     """Coefficients of the polynomials through values at `NODES`, lowest power first, along a first axis.
 
-    Not a matrix product: how BLAS rounds a cell depends on how many other cells there are.
+    This is not a matrix product, because the rounding of a cell by BLAS depends on the number of cells.
     """
     return np.stack([sum(w * each for w, each in zip(row, values, strict=True)) for row in _FIT])

@@ -1,4 +1,4 @@
-"""The ripple-free spin n* = n - Σ K_ij u_i M_j: what the spin does beside rippling with the rattle.
+"""The ripple-free spin n* = n - Σ K_ij u_i M_j: the spin without its ripple due to the rattle.
 
 A rattle makes the spin ripple at twice the frequencies of its two modes, and at their sum and difference.  Without
 slip, at n = 0 and to second order in the rattle, this ripple is the bilinear form K of u and of the angular momentum M
@@ -18,9 +18,9 @@ as Σ h_jk p_j p_k.  The part of it that oscillates is the derivative of Σ κ_j
 
     κ_kk = h_kk / 2 ν_k,   κ_12 = 2 h_12 ν_1 / (ν_1² - ν_2²),   κ_21 = -2 h_12 ν_2 / (ν_1² - ν_2²).
 
-The rest, h_kk times the mean of p_k², is what changes the spin.  So I3 K is the form of κ less that of P.
+The rest, h_kk times the mean of p_k², changes the spin.  So I3 K is the form of κ less that of P.
 
-Of a small rolling rattle at n = 0, K leaves 1e-6 of the ripple (a = 10, b = 5, δ = 0.03; u = 1e-4): terms of fourth
+For a small rolling rattle at n = 0, K leaves 1e-6 of the ripple (a = 10, b = 5, δ = 0.03; u = 1e-4): terms of fourth
 order.
 """
 
@@ -41,7 +41,7 @@ _APART = 1e-9
 
 
 def for_each_body(of: Callable[[Columns], tuple[Array, ...]], columns: Columns) -> tuple[Array, ...]:
-    """What `of` gives of columns, computed once for cells that are alike."""
+    """The result of `of` for columns, computed once for identical cells."""
     bodies, which = np.unique(stack(tuple(columns.values())), axis=1, return_inverse=True)
     return tuple(each[which.reshape(-1)] for each in of(dict(zip(columns, bodies, strict=True))))
 

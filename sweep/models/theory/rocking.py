@@ -2,11 +2,11 @@
 
     u' = B M,   M' = C u
 
-to first order in u1, u2, M1, M2.  -ν² are the eigenvalues of B C.  What they are for a body is in
-`sweep.models.general.rigid_body`.
+to first order in u1, u2, M1, M2.  -ν² are the eigenvalues of B C.  `sweep.models.general.rigid_body` gives them for a
+body.
 
-The paper's ν1, ν2 neglect c² beside a² and b² in C: at a = 10, b = 3 they give 3.65 for the period of the slower mode,
-which is 3.87.
+The paper's ν1, ν2 neglect c² compared with a² and b² in C: at a = 10, b = 3 they give 3.65 for the period of the slower
+mode; the right value is 3.87.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Finds at which spins upright spin is stable, in a model itself: all of them at once, by eigenvalues.
+"""Find the spins at which the upright spin of a model is stable: all of them at once, by eigenvalues.
 
 At constant spin n a small rattle z obeys z' = J(n) z, and J is a quadratic polynomial in n, as rigid bodies have
 gyroscopic terms linear in their spin and centrifugal ones quadratic in it.  Where the rattle begins or ceases to grow,
@@ -7,8 +7,8 @@ compound of J, whose eigenvalues are the sums of two eigenvalues of J, or J itse
 
     (K0 + n K1 + n² K2) z = 0
 
-holds for some z, for K the compound or J.  This is an eigenvalue problem for 1/n.  Its real solutions are all spins
-where stability may change, so that none is missed, however narrow a range is.
+holds for some z, for K the compound or J.  This is an eigenvalue problem for 1/n.  Its real solutions are all the
+spins where stability may change, so no range is missed, however narrow it is.
 
 A search outwards from the paper's n_c1, by factors of 1.7, missed the first change in 3 of 5932 searches (bodies with
 a = 1.5 … 50, |δ| <= 0.5, μ = 0.1 … 5000) and took three times as long.
@@ -24,8 +24,8 @@ from sweep.models.model import Array, Columns, Model, stack, take
 from sweep.models.theory.linear import growth_rate, jacobian
 
 SPIN_LIMIT = 10.0
-"""Largest |spin| examined, in sqrt(g/c), fifty times what a hand gives: upright spin that is stable up to here is
-taken to be stable at any spin."""
+"""Largest |spin| examined, in sqrt(g/c), fifty times the spin that a hand gives: upright spin that is stable up to
+this limit is taken as stable at any spin."""
 
 _SLOW_SPIN = 1e-8
 """A spin at which couples are as at rest, in sqrt(g/c)."""
@@ -59,8 +59,8 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     -------
     Shape (6, cells), in sqrt(g/c): the lower and the upper end of each range, as `Kernel.images` takes them.
     Infinite where a range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body
-    whose rattle does not decay at rest (no friction, or no dissipation in the model), or whose third axis is no axis of
-    inertia, so that it cannot spin upright.
+    whose rattle does not decay at rest (no friction, or no dissipation in the model), or whose third axis is not an
+    axis of inertia, so that it cannot spin upright.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def share_within(model: Model, columns: Columns) -> Array:
 
 
 def _is_steady(model: Model, constants, spin: Array) -> Array:
-    """Tell whether no rattle arises from upright `spin` by itself, shape (cells,)."""
+    """Return whether upright `spin` is stable, so that no rattle arises by itself, shape (cells,)."""
     slopes, _ = model.rhs(tuple(stack(model.upright(spin))), constants)
     arising = np.abs(np.delete(stack(slopes), model.spin_state, axis=0)).max(axis=0)
     return np.asarray(arising <= 1e-12 * spin**2)
@@ -155,7 +155,7 @@ def _ends(model: Model, constants, changes: Array, sign: int, limits: Array) -> 
     growth[cells, place] = growth_rate(model, take(constants, cells), sign * spins)
 
     def first(wanted: Array, beyond: Array) -> Array:
-        """The first change to such a state beyond a spin; infinite if there is none."""
+        """The first change to that state beyond a spin; infinite if there is none."""
         return np.asarray(np.where(wanted & (changes > beyond[:, None]), changes, np.inf).min(axis=-1))
 
     end = first(growth >= 0, np.zeros(len(changes)))

@@ -1,1 +1,1 @@
-"""Models that users bring: loaded from a file or an entry point, checked, tried out, and blamed by line."""
+"""Users' models: loaded from a file or an entry point, checked, tried out, with errors traced to their line."""

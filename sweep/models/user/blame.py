@@ -1,4 +1,4 @@
-"""Says where an error comes from that the code of a user's model has raised."""
+"""Find the place of an error raised by the code of a user's model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sweep.models.origin import Origin
 
 @contextmanager
 def blamed(origin: Origin | None, *, always: bool = False) -> Iterator[None]:
-    """Turn errors that come from the code of a user's model, or all errors, into a `ConfigError` that says where."""
+    """Turn errors raised by the code of a user's model, or all errors, into a `ConfigError` that gives the place."""
     try:
         yield
     except ConfigError:
@@ -27,7 +27,8 @@ def blamed(origin: Origin | None, *, always: bool = False) -> Iterator[None]:
 
 
 def _place(error: Exception, origin: Origin) -> tuple[str, int | None]:
-    """File and line of the user's code, by Python's traceback or by what Numba tells; "" if it comes from elsewhere."""
+    """File and line in the user's code, from Python's traceback or Numba's message; "" if the error comes from
+    elsewhere."""
     known = {abspath(file): file for file in origin.files}
     chain = filter(None, (error, error.__cause__))
     lines = [(f.f_code.co_filename, n) for each in chain for f, n in traceback.walk_tb(each.__traceback__)]

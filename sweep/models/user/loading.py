@@ -1,6 +1,6 @@
-"""Models that users bring: from a Python file, or from an installed package by an entry point.
+"""Load users' models from a Python file, or from an installed package by an entry point.
 
-Their code runs when they are loaded.  So nothing here is called with a name that the user has not given.
+Loading a model runs its code, so nothing here may be called with a name that the user has not given.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ GROUP = "sweep.models"
 
 
 def entry_point(name: str) -> Origin | None:
-    """The model that an installed package offers by a name; None if there is none.  Nothing is imported."""
+    """The model that an installed package offers under a name; None if there is none.  Nothing is imported."""
     found = metadata.entry_points(group=GROUP, name=name)
     if not found:
         return None
@@ -36,12 +36,12 @@ def entry_point(name: str) -> Origin | None:
 
 @cache
 def load(origin: Origin) -> Model | SlipWith:
-    """Run the code of a file or a package, once in a process, and return what it defines as its model.
+    """Run the code of a file or a package, once in a process, and return the model that it defines.
 
     Raises
     ------
     ConfigError
-        if that cannot be done, or if what it defines is no model.
+        if the code cannot be run, or does not define a model.
     """
     made: Model | SlipWith
     with blamed(origin):
@@ -49,7 +49,7 @@ def load(origin: Origin) -> Model | SlipWith:
         trial.check(made, origin)
     if isinstance(made, SlipWith):
         return replace(made, origin=origin)
-    # The states of an image lie beside other quantities, whose names nobody has to know.
+    # The states of an image share a table with other quantities, so their names could clash.
     states = tuple(f"state.{name}" for name in made.states)
     parameters = (*(p.name for p in made.own_parameters), *made.parameters)
     return replace(made, origin=origin, states=states, parameters=parameters)
@@ -59,7 +59,7 @@ def _file(origin: Origin):
     module = ModuleType(f"sweep_model_{origin.digest[:16]}")
     module.__file__ = origin.place
     sys.modules[module.__name__] = module
-    # Messages quote what runs, not what the file may say by then.
+    # Messages quote the text that runs, even if the file has changed since.
     linecache.cache[origin.place] = (len(origin.text), None, origin.text.splitlines(keepends=True), origin.place)
     try:
         code = compile(origin.text, origin.place, "exec")
@@ -81,7 +81,8 @@ def _imported(origin: Origin):
 
 
 def table(origin: Origin | None) -> dict[str, Parameter]:
-    """The parameters that a configuration may name: of a user's model, or, without one, of those of this package."""
+    """The parameters that a configuration may name: those of a user's model or, without one, those of the package's
+    models."""
     if origin is None:
         return PARAMETERS
     made = load(origin)
@@ -92,13 +93,13 @@ def table(origin: Origin | None) -> dict[str, Parameter]:
 
 
 def law(origin: Origin) -> Law | None:
-    """The law of friction that a file brings for `slip`; None if it brings a model of its own."""
+    """The law of friction that a file defines for `slip`; None if it defines a complete model."""
     made = load(origin)
     return made.law if isinstance(made, SlipWith) else None
 
 
 def find(origin: Origin, physics: Physics) -> Model:
-    """The model that the user brings, or that for this physics, which has the law of friction that they bring."""
+    """The user's model, or the model for this physics with the user's law of friction."""
     made = load(origin)
     if isinstance(made, Model):
         return made
@@ -106,6 +107,6 @@ def find(origin: Origin, physics: Physics) -> Model:
 
 
 def compiled_as(origin: Origin, name: str) -> Model:
-    """The model whose compiled code has the key "name@digest"."""
+    """The model whose compiled code is stored under the key "name@digest"."""
     made = load(origin)
     return made if isinstance(made, Model) else replace(variants.variant(name, made.law), origin=origin)

@@ -1,7 +1,7 @@
-"""Checks a model that a user brings: what it declares, and what its functions return for some cells.
+"""Check a user's model: its declarations, and the results of its functions for some cells.
 
-Only what would give wrong numbers in silence, or an error far from its cause, is looked for.  Errors of the code itself
-are left to Python, which knows their line (`sweep.models.user.blame`).
+Only faults that would silently give wrong numbers, or an error far from its cause, are checked.  Errors in the code
+itself are left to Python, which reports their line (`sweep.models.user.blame`).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from sweep.units import is_of_paper
 _OFFERS = {COUNT: "COUNT", SPIN: "SPIN", ENERGY: "ENERGY", LINEAR: "LINEAR"}
 
 Faults = Iterator[tuple[Any, str]]
-"""The function at fault, or None, and what is wrong and what to do."""
+"""The function at fault, or None, and a sentence on what is wrong and what to do."""
 
 
 def check(made, origin: Origin) -> None:
-    """Raise a `ConfigError` for the first fault of what a file or an entry point defines as its MODEL."""
+    """Raise a `ConfigError` for the first fault of the MODEL that a file or an entry point defines."""
     _refuse(_declared(made), origin)
 
 
@@ -39,12 +39,12 @@ def try_out(model: Model, columns: Columns, law: Law | None = None) -> None:
     Parameters
     ----------
     columns : physical parameters by name, each of shape (cells,)
-    law : the law of friction, if that is all that the user brings
+    law : the law of friction, if the user has defined no more than that
 
     Raises
     ------
     ConfigError
-        if one of them returns something else than it has to.
+        if one of them returns anything but what it should.
     """
     assert model.origin
     with np.errstate(all="ignore"), blamed(model.origin, always=True):
@@ -80,17 +80,17 @@ def _declared(made) -> Faults:
     if made.units not in ("paper", "SI", OWN):
         yield None, f"units {made.units!r} are unknown; choose paper, SI or {OWN}"
     if made.upright is never_upright and (LINEAR in made.offers or made.fastest_motion is None):
-        yield None, "nothing tells how fast it moves, for the length of its steps; give it upright or fastest_motion"
+        yield None, "the length of its steps needs a bound on its motion; define upright or fastest_motion"
     if COUNT in made.offers and made.slower_period is never_rocks:
-        yield None, "reversals are counted of an averaged spin; give it slower_period, or do not offer COUNT"
+        yield None, "reversals are counted in an averaged spin; define slower_period, or do not offer COUNT"
 
 
 def _names(name: str, taken: Collection[str], own: tuple[Parameter, ...], used: tuple[str, ...]) -> Faults:
     if not name.isidentifier() or name in taken:
-        yield None, f"the name {name!r} is no word of letters, digits and _, or taken ({', '.join(taken)}); change it"
+        yield None, f"invalid model name {name!r}: use letters, digits and _, and none of {', '.join(taken)}"
     for p in own:
         if wrong := [word for word in filter(None, (p.name, p.section)) if not word.isidentifier()]:
-            yield None, f"parameter {p.path}: {wrong[0]!r} is no word of letters, digits and _; rename it"
+            yield None, f"parameter {p.path}: {wrong[0]!r} is invalid; use letters, digits and _"
         if p.default is not None and not p.allows(p.default):
             yield None, f"parameter {p.path}: its default {p.default:g} is out of its bounds; it has to be {p.allowed}"
         if is_of_paper(p.long_name.rpartition(", in ")[2]):
@@ -143,7 +143,7 @@ def _values(model: Model, columns: Columns) -> Faults:
 
 
 def _settling_too_early(model: Model, columns: Columns, law: Law | None) -> Faults:
-    """Faults that would make trajectories settle too early."""
+    """Find faults that would make trajectories settle too early."""
     if law and law.linear_to is None:
         at_rest, fast = (np.asarray(law.resistance(square, model.constants.of(columns))) for square in (0.0, 1.0))
         if not np.array_equal(at_rest, fast):
