@@ -235,7 +235,11 @@ def _labelled(
     judged, edge = verdict.judged(problem, best), _ends(problem, limits)
     shown, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
-        f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
+        f"{side}_{level}": (
+            "parameter",
+            problem.values(limits[k, end]),
+            {"long_name": f"{side} end, {level} % confidence"},
+        )
         for k, level in enumerate(LEVELS)
         for end, side in enumerate(("lower", "upper"))
     }

@@ -1,8 +1,9 @@
-"""Finds the intervals of a fit: how far each parameter can go while the others keep the misfit low.
+"""Finds the confidence intervals of a fit: how far each parameter can go while the others keep the misfit low.
 
-An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
-within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).  It also
-holds the values at every other point found with a misfit that low: other minima, and points on other profiles.
+An interval reaches from the least to the largest value of a parameter at which the other parameters can keep the
+misfit, in units of the variance, within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi
+10.1093/bioinformatics/btp358).  The misfit may have several valleys: a coarse scan of every parameter finds them, and
+each side is then followed outwards from the outermost of them.
 """
 
 from __future__ import annotations

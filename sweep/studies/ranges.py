@@ -174,9 +174,7 @@ def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
     pairs = (pair for pair in (["x0", "y0"], ["pitch", "roll"]) if {*pair} <= free.keys())
     names = next((pair for pair in pairs if all(free[name].low == -free[name].high for name in pair)), [])
     others = ("Ixz", "Iyz", "omega1", "omega2", "slip1", "slip2")
-    odd = names and any(
-        name in free or config.parameters[name].numbers != (0.0,) for name in others if name in config.parameters
-    )
+    odd = any(name in free or config.parameters[name].numbers != (0.0,) for name in others if name in config.parameters)
     return [] if odd else names
 
 
