@@ -99,7 +99,7 @@ def fit(
         found, limits, rugged = intervals(problem, minima, note)
         (best,) = _turned(problem, [found])
         if best is not found:
-            at = _start(problem)
+            at = problem.mirrored
             limits[..., at] = 1 - limits[:, ::-1][..., at]
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
     return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, compared=compared)
@@ -156,7 +156,7 @@ def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list
 
 def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
     """Turn minima by half a turn where that changes nothing: the best to the configured start, the others to it."""
-    if not (at := _start(problem)):
+    if not (at := problem.mirrored):
         return minima
     toward = np.full(2, 0.5)
     toward[0] += problem.config.parameters[list(problem.free)[at[0]]].numbers[0] or 1.0
@@ -169,11 +169,6 @@ def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
         turned.append(each)
         toward = turned[0].place[at]
     return turned
-
-
-def _start(problem: Problem) -> list[int]:
-    """Return the indices of the free parameters whose sign half a turn changes."""
-    return [list(problem.free).index(name) for name in ranges.mirrored(problem.config, problem.free)]
 
 
 def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:
@@ -240,7 +235,11 @@ def _labelled(
     judged, edge = verdict.judged(problem, best), _ends(problem, limits)
     shown, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
-        f"{side}_{level}": ("parameter", problem.values(limits[k, end]), {"long_name": f"{side} end, {level} %"})
+        f"{side}_{level}": (
+            "parameter",
+            problem.values(limits[k, end]),
+            {"long_name": f"{side} end, {level} % confidence"},
+        )
         for k, level in enumerate(LEVELS)
         for end, side in enumerate(("lower", "upper"))
     }

@@ -1,14 +1,16 @@
-"""Finds the intervals of a fit: how far each parameter can go while the others keep the misfit low.
+"""Finds the confidence intervals of a fit: how far each parameter can go while the others keep the misfit low.
 
-An interval holds the values of a parameter at which the other parameters can keep the misfit, in units of the variance,
-within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi 10.1093/bioinformatics/btp358).  It also
-holds the values at every other point found with a misfit that low: other minima, and points on other profiles.
+An interval reaches from the least to the largest value of a parameter at which the other parameters can keep the
+misfit, in units of the variance, within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi
+10.1093/bioinformatics/btp358).  The misfit may have several valleys: a coarse scan of every parameter finds them, and
+each side is then followed outwards from the outermost of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +27,14 @@ _BLIND = 0.5
 
 # Number of times intervals are computed again because a lower minimum has turned up.
 _RESTARTS = 3
+
+# Places of the coarse profiles, as shares of the range and as deviations from the best; their relative accuracy, first
+# of all and then of those whose misfit exceeds the minimum by less than so many variances.
+_WIDE, _NARROW = np.linspace(0.08, 0.92, 6), np.array([-3.0, -1.5, 1.5, 3.0])
+_ACCURACIES, _HIGH = (1e-2, 1e-5), 100.0
+
+# Fall of the misfit, in units of the variance, with which a minimum is lower than the best.
+_LOWER = 0.01
 
 # Accuracy of a profile, in units of the variance.
 _ENOUGH = 3e-3
@@ -74,25 +84,57 @@ def _profiles(
     problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Callable[[str], None], *, stops: bool
 ) -> tuple[Array, Minimum | None]:
     """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
-    unit = variance(problem, best)
-    known = [(best.place, 0.0), *((each.place, (each.misfit - best.misfit) / unit) for each in minima)]
-    parameters = range(len(problem.free))
+    unit, parameters = variance(problem, best), range(len(problem.free))
+    valleys = [*minima, *_scanned(problem, best)]
+    lower = min(valleys, key=lambda each: each.misfit)
+    if stops and lower.misfit < best.misfit - _LOWER * unit:
+        return np.empty(0), lower
+    known = [(best.place, 0.0), *((each.place, (each.misfit - best.misfit) / unit) for each in valleys)]
+    known = [(_on_side(problem, place, best), rise) for place, rise in known]
     sides = [
         partial(_side, problem=problem, best=best, known=known, i=i, sign=sign) for sign in (-1, 1) for i in parameters
     ]
     found = run_concurrently(sides, problem.answers, lambda side: stops and side.lower is not None)
     note(f"intervals: {problem.trajectories} trajectories so far")
-    lower = min((side.lower for side in found if side.lower), key=lambda each: each.misfit, default=None)
-    if lower and stops:
-        return np.empty(0), lower
+    lowest = min((side.lower for side in found if side.lower), key=lambda each: each.misfit, default=None)
+    if lowest and stops:
+        return np.empty(0), lowest
     low, high = np.reshape([side.ends for side in found], (2, len(problem.free), len(LEVELS))).transpose(0, 2, 1)
-    known += [each for side in found for each in side.valley]
+    known += [(_on_side(problem, place, best), rise) for side in found for place, rise in side.valley]
     places, above = np.stack([place for place, _ in known]), np.array([rise for _, rise in known])
     for level, allowed in enumerate(LEVELS.values()):
         within = places[above <= allowed]
         low[level] = np.minimum(low[level], within.min(axis=0))
         high[level] = np.maximum(high[level], within.max(axis=0))
     return np.stack([np.minimum.accumulate(low), np.maximum.accumulate(high)], axis=1), None
+
+
+def _on_side(problem: Problem, place: Array, best: Minimum) -> Array:
+    """Return a place, turned by half a turn, which changes nothing, if that takes its start to the side of the best."""
+    at, place = problem.mirrored, place.copy()
+    if (place[at] - 0.5) @ (best.place[at] - 0.5) < 0:
+        place[at] = 1 - place[at]
+    return place
+
+
+def _scanned(problem: Problem, best: Minimum) -> list[Minimum]:
+    """Return minima, most of them with one parameter fixed, in valleys that walls of the misfit hide from a profile."""
+    deviation, searches = np.sqrt(np.diag(covariance(problem, best))), list[tuple[int, Array]]()
+    for i in range(len(problem.free)):
+        for end in np.clip([*_WIDE, *(best.place[i] + _NARROW * deviation[i])], 0, 1):
+            searches.append((i, np.where(np.arange(len(problem.free)) == i, end, best.place)))
+    found, unit = list[Minimum](), variance(problem, best)
+    for enough in _ACCURACIES:
+        found = _minimised(problem, [partial(minimise, place=at, fixed=i, enough=enough) for i, at in searches])
+        low = [each.misfit < best.misfit + _HIGH * unit for each in found]
+        found = [*compress(found, low)]
+        searches = [(i, each.place) for (i, _), each in zip(compress(searches, low), found, strict=True)]
+    beyond = [each.place for each in found if each.misfit > best.misfit + LEVELS[95] * unit]
+    return found + _minimised(problem, [partial(minimise, place=at, enough=_ACCURACIES[-1]) for at in beyond])
+
+
+def _minimised(problem: Problem, searches: list[Callable[[Ask], Minimum]]) -> list[Minimum]:
+    return run_concurrently(searches, problem.answers) if searches else []
 
 
 def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, float]], i: int, sign: int) -> _Side:
@@ -102,8 +144,9 @@ def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, fl
     along, reach, ends = spread[:, i] / size**2, float(size), list[float]()
     side = _Side(ends, [], None)
     for allowed in LEVELS.values():
-        near, far = (reach, np.inf) if ends else (0.0, np.inf)
         reach *= float(np.sqrt(allowed / LEVELS[68]))
+        near = max(sign * (place[i] - best.place[i]) for place, rise in known + side.valley if rise <= allowed)
+        reach, far = max(reach, float(near + size / 2)), np.inf
         for _ in range(8):
             end = float(np.clip(best.place[i] + sign * reach, 0, 1))
             places = [place for place, rise in known + side.valley if rise < 10 * allowed]
@@ -112,7 +155,7 @@ def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, fl
             found = minimise(ask, start, i, _ENOUGH / problem.rows)
             above = (found.misfit - best.misfit) / unit
             side.valley.append((found.place, above))
-            if above < -0.01 * allowed:
+            if above < -_LOWER * allowed:
                 side = side._replace(lower=found)
             if side.lower or abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
                 break

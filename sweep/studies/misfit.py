@@ -20,7 +20,7 @@ from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
-from sweep.studies.ranges import Range
+from sweep.studies.ranges import Range, mirrored
 
 UNKNOWNS = ("film_delay", "film_bias")
 """Parameters of the film that a fit may find besides those of the body, by the names that the option --free takes."""
@@ -86,6 +86,11 @@ class Problem:
     def measured(self) -> list[int]:
         """Indices of the parameters that were measured independently."""
         return [i for i, each in enumerate(self.free.values()) if each.prior]
+
+    @property
+    def mirrored(self) -> list[int]:
+        """Indices of the start point or tilt, whose signs half a turn reverses."""
+        return [list(self.free).index(name) for name in mirrored(self.config, self.free)]
 
     def values(self, places: Array) -> Array:
         """Return the free parameters at places, of the same shape (..., free)."""
