@@ -327,6 +327,7 @@ def animate(
     from pathlib import Path
     from typing import cast
 
+    from sweep.config import load_config
     from sweep.plots import animation
 
     if output is not None:
@@ -338,7 +339,9 @@ def animate(
         with reporting(progress, reporter) as reporter:
             of_file = shown(source, reporter)
         return animation.animate(of_file, output, begin=begin, end=end, speed=speed, **values)
-    followed = trajectory(cast("ConfigLike", source), progress=progress, reporter=reporter, **values)
+    config = cast("ConfigLike", source)
+    animation.require_attitude(load_config(config))
+    followed = trajectory(config, progress=progress, reporter=reporter, **values)
     return animation.animate(followed, output, begin=begin, end=end, speed=speed)
 
 

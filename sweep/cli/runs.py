@@ -138,12 +138,8 @@ def animate(
     target = output or usual
     animation.check(target)
     require_writable(target)
-    if config and config.simulated and not config.equations.path:
-        from sweep.faults import ConfigError
-
-        words = f"the bodies of {config.model} have no attitude; animate slip or noslip"
-        raise ConfigError([config.fault(("model",), words)])
     if config:
+        animation.require_attitude(config)
         result = _followed(config, cells_of(cells, config.table), quiet)
     else:
         from sweep.progress import Terminal

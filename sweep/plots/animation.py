@@ -15,7 +15,8 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from sweep.faults import fault_of
+from sweep.config import Config
+from sweep.faults import ConfigError, fault_of
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.figure import constants_in_lines, zero_line
@@ -77,6 +78,13 @@ def animate(
 def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
     """Return whether `source` is a dataset or the path of one, and not a configuration."""
     return isinstance(source, xr.Dataset) or (isinstance(source, str | Path) and suffix(Path(source)) == "nc")
+
+
+def require_attitude(config: Config) -> None:
+    """Raise a `ConfigError` if the bodies of a simulated model have no attitude that could be shown."""
+    if config.simulated and not config.equations.path:
+        words = f"the bodies of {config.model} have no attitude; animate slip or noslip"
+        raise ConfigError([config.fault(("model",), words)])
 
 
 def check(path: Path) -> None:

@@ -11,6 +11,7 @@ import xarray as xr
 from PIL import Image
 from support import ROOT, Write
 from support.cli import invoke, refused
+from support.runs import Stop
 
 import sweep
 from sweep.config import ConfigError
@@ -131,3 +132,8 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     with without, pytest.raises(ConfigError, match="ffmpeg, which is not installed"):
         animation.animate(turning(), tmp_path / "clip.mp4")
     refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
+
+
+def test_a_model_without_an_attitude_is_refused_before_it_is_simulated() -> None:
+    with pytest.raises(ConfigError, match="model: the bodies of effective have no attitude; animate slip or noslip"):
+        sweep.animate({"model": "effective", "friction": {"mu": 60}}, reporter=Stop(0))
