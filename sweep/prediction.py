@@ -29,7 +29,7 @@ class Prediction(NamedTuple):
     """n_c1+ and n_c1- of the linear theory, shape (2, bodies): infinite where the rattle decays at every spin, and NaN
     where it does not decay at rest, or where that theory does not apply; empty for a tier that is not simulated."""
     ranges: Array
-    """Ranges of spin in which the rattle decays, shape (7, cells), as `Kernel.images` takes them."""
+    """Ranges of spin in which the rattle decays, shape (7, cells), as `stability.stable_ranges` gives them."""
 
 
 def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction:
@@ -43,7 +43,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     if not isinstance(tier, Model):
         return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
     bodies, place = grid.bodies()
-    ranges = _ranges(tier, bodies.columns()) if LINEAR in tier.offers else np.full((7, bodies.size), np.nan)
+    ranges = _stable_ranges(tier, bodies.columns()) if LINEAR in tier.offers else np.full((7, bodies.size), np.nan)
     n_c1 = ranges[1::-1]
     if LINEAR in tier.offers or not tier.origin:
         found["n_c1_plus_linear"], found["n_c1_minus_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan)
@@ -81,12 +81,9 @@ def decay_times(model: Model, grid: Grid) -> Array:
     return np.asarray(np.nan_to_num(_in_parts(times, model, bodies.columns(), 1)[0])[place])
 
 
-def _ranges(model: Model, columns: Columns) -> Array:
+def _stable_ranges(model: Model, columns: Columns) -> Array:
     """Ranges of spin in which the rattle of bodies decays, shape (7, bodies); NaN for bodies that cannot be."""
-    return _in_parts(
-        lambda some: np.vstack([stability.stable_ranges(model, some), stability.share_within(model, some)]),
-        model, columns, 7,
-    )  # fmt: skip
+    return _in_parts(lambda some: stability.stable_ranges(model, some), model, columns, 7)
 
 
 def _in_parts(of: Callable[[Columns], Array], model: Model, columns: Columns, rows: int) -> Array:

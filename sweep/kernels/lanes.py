@@ -206,7 +206,7 @@ def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: boo
         if slows:
             share = group[SHARE + lane]
             within = (lowest > share * group[FROM + lane]) & (highest < share * group[TO + lane])
-            inside = inside if share == 1.0 else within | (e == 0.0)
+            inside = within | (e == 0.0) if share < 1.0 else inside
         at_rest = (spin == 0.0) & (e == 0.0)
         signed = (lowest > 0.0) | (highest < 0.0) | at_rest
         followed = may_settle(group, lane, spin, at_rest)

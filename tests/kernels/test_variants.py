@@ -42,7 +42,7 @@ def test_kane_and_levinson_by_the_kernel(tmp_path: Path) -> None:
         assert float(at["t_first_reversal"]) == pytest.approx(time, abs=0.19)
     assert int(result["reversals"].sel(sigma=1e-4, omega3=5)) == 0
     assert result["status"].sel(sigma=0).values.tolist() == [2, 2]
-    assert result["status"].sel(sigma=1e-4).values.tolist() == [1, 1]
+    assert result["status"].sel(sigma=1e-4).values.tolist() == [2, 2]  # it slows the spin faster than the rattle
     assert float(result["energy_error"].max()) < 1e-7
 
 

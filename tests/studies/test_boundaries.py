@@ -207,7 +207,7 @@ def test_margins_of_a_grid_draw_the_curves_without_a_search(found: xr.Dataset) -
     assert len(off) >= 4
     assert np.median(off) < 0.15
     assert max(off) < 0.5
-    assert "count begins (estimated)" in " ".join(entries(picture.plot(grid, x="b", y="mu")))
+    assert "boundary of counts" in " ".join(entries(picture.plot(grid, x="b", y="mu")))
     assert not description.boundaries(grid.drop_vars("margin_more"), *axes)
 
 

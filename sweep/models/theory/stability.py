@@ -57,10 +57,11 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
 
     Returns
     -------
-    Shape (6, cells), in sqrt(g/c): the lower and the upper end of each range, as `Kernel.images` takes them.
-    Infinite where a range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body
-    whose rattle does not decay at rest (no friction, or no dissipation in the model), or whose third axis is not an
-    axis of inertia, so that it cannot spin upright.
+    Shape (7, cells), as `Kernel.images` takes it: the lower and the upper end of each range, in sqrt(g/c), and the
+    share of the first within which the rattle decays faster than a couple slows the spin.  An end is infinite where a
+    range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body whose rattle does
+    not decay at rest (no friction, or no dissipation in the model), or whose third axis is not an axis of inertia, so
+    that it cannot spin upright.
 
     Raises
     ------
@@ -69,11 +70,12 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     """
     constants, limits = model.constants.of(columns), SPIN_LIMIT * model.spin_unit(columns)
     rest = np.zeros_like(constants[0])
-    ranges = np.full((6, len(rest)), np.nan)
-    steady = _is_steady(model, constants, model.spin_unit(columns))
-    cells = np.flatnonzero((growth_rate(model, constants, rest) < DECAYS) & steady)
+    ranges = np.full((7, len(rest)), np.nan)
+    unit, growth = model.spin_unit(columns), growth_rate(model, constants, rest)
+    cells = np.flatnonzero((growth < DECAYS) & _is_steady(model, constants, unit))
     if len(cells):
         constants = take(constants, cells)
+        ranges[6, cells] = _share_within(model, constants, unit[cells], -growth[cells])
         changes = _possible_changes(*_polynomial(model, constants))
         for sign, rows in ((-1, (0, 3, 2)), (1, (1, 4, 5))):
             ends = _ends(model, constants, sign * changes, sign, limits[cells])
@@ -82,25 +84,18 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     return ranges
 
 
-def share_within(model: Model, columns: Columns) -> Array:
-    """Return within which share of the range about zero the rattle decays faster than a couple slows the spin.
+def _share_within(model: Model, constants, unit: Array, decay: Array) -> Array:
+    """Return the share of the range about zero within which the rattle decays faster than a couple slows the spin.
 
     By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 changes as e' = -2 s (n_c - n) e, and the spin as
     n' = -s e - r n, where r is its decay rate by the couple.  Then q = sqrt(e)/n obeys q'/q = r - s n_c + s n (1 + q²).
     So sqrt(e) falls for ever faster than n, and cannot turn it, if n (1 + q²) < n_c (1 - r/(s n_c)), where s n_c is the
-    decay rate of the rattle at rest.
-
-    Returns
-    -------
-    Shape (cells,): 1 without a couple; 0 if the spin decays faster at rest than the rattle.
+    `decay` rate of the rattle at rest.  The share is 1 without a couple.
     """
-    constants, small = model.constants.of(columns), _SLOW_SPIN * model.spin_unit(columns)
-    upright = stack(model.upright(small))[model.spin_state]
-    slowing = -stack(model.rhs(tuple(stack(model.upright(small))), constants)[0])[model.spin_state] / upright
-    decay = -growth_rate(model, constants, np.zeros_like(small))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(slowing > 0, 1 - _MARGIN * slowing / decay, 1.0)
-    return np.asarray(np.where(decay > 0, np.clip(share, 0.0, 1.0), 1.0))
+    upright = tuple(stack(model.upright(_SLOW_SPIN * unit)))
+    slopes, _ = model.rhs(upright, constants)
+    slowing = -slopes[model.spin_state] / upright[model.spin_state]
+    return np.asarray(np.where(slowing > 0, np.clip(1 - _MARGIN * slowing / decay, 0.0, 1.0), 1.0))
 
 
 def _is_steady(model: Model, constants, spin: Array) -> Array:
