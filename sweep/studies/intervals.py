@@ -29,7 +29,7 @@ _BLIND = 0.5
 _RESTARTS = 3
 
 # Places of the coarse profiles, as shares of the range and as deviations from the best; their relative accuracy, first
-# of all and then of those whose misfit exceeds the minimum by less than so many variances.
+# of all profiles, and then of those whose misfit is at most this number of variances above the minimum.
 _WIDE, _NARROW = np.linspace(0.08, 0.92, 6), np.array([-3.0, -1.5, 1.5, 3.0])
 _ACCURACIES, _HIGH = (1e-2, 1e-5), 100.0
 
