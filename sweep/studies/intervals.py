@@ -28,9 +28,10 @@ _BLIND = 0.5
 # Number of times intervals are computed again because a lower minimum has turned up.
 _RESTARTS = 3
 
-# Places of the coarse profiles, as shares of the range and as deviations from the best; their relative accuracy, first
-# of all profiles, and then of those whose misfit is at most this number of variances above the minimum.
+# Values at which a scan holds each parameter, as shares of its range and as deviations from the best.
 _WIDE, _NARROW = np.linspace(0.08, 0.92, 6), np.array([-3.0, -1.5, 1.5, 3.0])
+
+# Relative accuracies of the scan: first rough, then fine where the misfit has risen by fewer variances than `_HIGH`.
 _ACCURACIES, _HIGH = (1e-2, 1e-5), 100.0
 
 # Fall of the misfit, in units of the variance, with which a minimum is lower than the best.

@@ -155,11 +155,11 @@ def test_wide_cells_keep_the_tolerance_or_say_so(tolerance: float) -> None:
 def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: str) -> None:
     """To the times at which cells end: by less than thrice the estimate in nine of ten, and by about as much.
 
-    One of 40 may differ by more than ten times the estimate.
+    One of 40 may differ by more than ten times the estimate: 5 of 240 do.
     """
     config = load_config(ROOT / "configs" / f"{name}.yaml", {"t_end": 1000.0})
     grid = config.grid
-    job = plan(config, grid.take(np.linspace(0, grid.size - 1, 40).astype(int)))
+    job = plan(config, grid.take(np.linspace(0, grid.size - 1, min(grid.size, 240)).astype(int)))
     lives = begin(job.parts)
     live(lives)
     found = errors.results(replace(job, parts=tuple(each.cells for each in lives)), lives)
@@ -172,7 +172,7 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
     ratio = difference / found["spin_error"][sound]
     assert sound.mean() > 0.9
     assert 0.3 < np.median(ratio) < np.quantile(ratio, 0.9) < 3
-    assert (ratio > 10).sum() <= 1
+    assert (ratio > 10).mean() <= 1 / 40
 
 
 def test_a_long_run_begins_with_longer_steps_only_where_its_error_is_checked() -> None:
