@@ -151,7 +151,7 @@ def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
     one, player = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).isel(trajectory=0), Player([])
     for shown, dataset in ((True, one), (False, one.rename({"a": "a1"}))):
         player.show(Curve(dataset, np.zeros(0), 0.0), "#000000", 60.0)
-        assert player.figure.visible == shown
+        assert player.root.visible == shown
 
 
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
