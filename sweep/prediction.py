@@ -65,9 +65,10 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
 
 
 def decay_times(model: Model, grid: Grid) -> Array:
-    """Return the time in which the slowest rattle at rest falls by e, in the model's units, shape (cells,).
+    """Return the time in which the rattle at rest decays by a factor of e, in the model's units, shape (cells,).
 
-    Zero where it does not decay, where a body cannot be, and for a model without a linear theory.
+    It is that of the mode that decays most slowly; 0 if a mode does not decay, for a body that cannot be, and for a
+    model without a linear theory.
     """
 
     def times(columns: Columns) -> Array:

@@ -15,7 +15,7 @@ from sweep.jit import on_all_threads
 from sweep.kernels import methods
 from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.method import FIXED
+from sweep.kernels.method import FIXED, Tolerance
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.kernels.status import IMPOSSIBLE
 from sweep.models.model import Columns
@@ -27,8 +27,8 @@ TOLERANCE_TIME = 400.0
 """The time in sqrt(c/g) to which a tolerance refers; the permitted error of a longer run grows in proportion."""
 
 _DECAY_TIMES, _SLOW, _LOOSEST = 2.0, 1.5, 8.0
-"""How long a slow run lasts at least, in times in which its rattle decays; the angle by which it may turn in a period
-of its rattle, if all its energy goes into the spin; and how many times the tolerance is taken at most."""
+"""The least length of the run of a slow body, in decay times of its rattle; the largest angle by which a slow body can
+turn in a period of its rattle; and the largest ratio of the tolerance for a first step to the tolerance."""
 
 # Each kernel is made once in a process, because its machine code takes a second to load.
 _kernel = cache(methods.make_kernel)
@@ -103,7 +103,7 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
 
     If there are no such cells, there is one choice with no cells.
     """
-    model, method = config.equations, config.integrator.method
+    model, integrator = config.equations, config.integrator
     each = [grid.columns() for grid in grids]
     columns = {name: np.concatenate([some[name] for some in each]) for name in each[0]}
     possible = np.flatnonzero(~model.impossible(columns))
@@ -111,10 +111,11 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
     if not len(possible):
         return (_cells(kernels(config)[0], config, possible, columns, np.empty(0), np.empty(0)),)
     tolerance = np.concatenate([first_tolerance(config, grid) for grid in grids])[possible]
-    if method == AUTO:
-        chosen, steps, rules = methods.cheapest(model, columns, tolerance, config.integrator.t_end)
+    if integrator.method == AUTO:
+        chosen, steps, rules = methods.cheapest(model, columns, tolerance, integrator.t_end)
     else:
-        chosen, (steps, rules) = np.full(len(possible), method), steps_of(method, config, columns, tolerance)
+        chosen = np.full(len(possible), integrator.method)
+        steps, rules = steps_of(integrator.method, config, columns, tolerance)
     choices = []
     for method in METHODS:
         if len(cells := np.flatnonzero(chosen == method)):
@@ -137,10 +138,10 @@ def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step:
 def first_tolerance(config: Config, grid: Grid) -> Array:
     """Return the tolerance for which the first step of each cell is chosen, shape (cells,).
 
-    It is larger than the tolerance itself where a run will be long, is compared with a companion and is repeated if its
-    error is too large: the permitted error grows with time, and a long run forgets its early errors. With the step for
-    the tolerance itself, half of the cells of `configs/mu_b.yaml` end with less than a hundredth of the permitted error
-    (scripts/LOG.md).  A body that spins fast may soon lift off or topple.
+    It exceeds the tolerance itself if the run will be long, and if a companion will show whether its error is too large
+    and the cell has to be repeated: the permitted error grows with time, and a long run forgets its early errors. With
+    the step for the tolerance itself, half of the cells of `configs/mu_b.yaml` end with less than a hundredth of the
+    permitted error (scripts/LOG.md). A body that spins fast may soon lift off or topple, so its run may be short.
     """
     how, model, columns = config.integrator, config.equations, grid.columns()
     if not (how.estimate_errors and config.repeats and how.step == "auto"):
@@ -151,13 +152,13 @@ def first_tolerance(config: Config, grid: Grid) -> Array:
     return np.asarray(how.tolerance * np.clip(least / TOLERANCE_TIME, 1.0, _LOOSEST))
 
 
-def steps_of(method: str, config: Config, columns: Columns, tolerance: Array | None = None) -> tuple[Array, Array]:
+def steps_of(method: str, config: Config, columns: Columns, tolerance: Tolerance | None = None) -> tuple[Array, Array]:
     """Return the step of each cell with a method, configured or automatic, and what set it; both of shape (cells,).
 
-    `tolerance`, of shape (cells,), is that of the configuration by default.
+    By default the automatic step is the one for the configuration's own tolerance.
     """
     step, cells = config.integrator.step, len(next(iter(columns.values())))
     if step == "auto":
-        tolerance = np.full(cells, config.integrator.tolerance) if tolerance is None else tolerance
+        tolerance = config.integrator.tolerance if tolerance is None else tolerance
         return methods.automatic_step(method, config.equations, columns, tolerance)
     return np.full(cells, step), np.full(cells, FIXED)

@@ -183,10 +183,10 @@ def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: boo
     had not settled by t = 30 000 do now; none of 5429 counts changed.  It does not hold where
     friction `saturates`, since the rattle that grows there leaves the energies at which the law is linear.
 
-    A couple that `slows` the spin carries it through all of this: out of an outer range into one where the rattle
-    grows, and below what is left of a rattle that decays more slowly.  It has settled then only in the share of the
-    inner range that `stability.share_within` gives, or once there is no rattle.  Without this rule 35 of 445 decided
-    counts were false in a draw of strong couples.
+    A couple that `slows` the spin can carry it out of an outer range into one where the rattle grows, or below what is
+    left of a rattle that decays more slowly.  With such a couple a trajectory has settled only within the share of the
+    inner range in `STABLE` (`sweep.models.theory.stability`), or when no rattle is left.  Without this rule, 35 of 445
+    decided counts of a draw with strong couples were false.
     """
     FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO, SHARE = map(layout.at, STABLE)
 

@@ -205,7 +205,7 @@ class Model(Tier):
 
     @property
     def slows(self) -> bool:
-        """Whether a couple may slow the spin: of a model that a user brings, nobody knows."""
+        """Whether a couple may slow the spin; it is assumed for a model that a user brings."""
         return bool(self.variant.couples) if self.variant else bool(self.origin)
 
     @property

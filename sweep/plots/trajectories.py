@@ -141,8 +141,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 
 
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
-    """Draw lines at the critical spins, one set per body: in the colour of its first trajectory if there are
-    several."""
+    """Draw lines at the critical spins of each body; among several bodies, in the colour of its first trajectory."""
     bodies: dict[tuple[tuple[str, str, float, str], ...], int] = {}
     for i in range(dataset.sizes["trajectory"]):
         bodies.setdefault(tuple(theory.levels(dataset.isel(trajectory=i))), i)

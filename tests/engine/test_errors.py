@@ -183,3 +183,13 @@ def test_a_long_run_begins_with_longer_steps_only_where_its_error_is_checked() -
     np.testing.assert_allclose(first_tolerance(long, long.grid)[1], 1e-8, rtol=1e-12)
     assert 2e-8 < first_tolerance(long, long.grid)[0] < 8e-8
     np.testing.assert_array_equal(first_tolerance(unchecked, unchecked.grid), 1e-8)
+    length, gravity = 0.02, 9.81
+    time = np.sqrt(length / gravity)
+    in_si = {
+        "units": "SI", "gravity": gravity, "friction": {"mu": 100 / np.sqrt(gravity * length)},
+        "body": {"a": 10 * length, "b": 3 * length, "c": length, "delta": 0.03, "mass": 1.0},
+        "start": {"n0": [0.05 / time, 5.0 / time], "x0": 0.01 * length, "y0": 0.01 * length},
+        "integrator": {"method": "adams"},
+    }  # fmt: skip
+    same = sweep.load_config(in_si)
+    np.testing.assert_allclose(first_tolerance(same, same.grid), first_tolerance(long, long.grid), rtol=1e-9)
