@@ -166,7 +166,7 @@ def boundaries(
     Raises
     ------
     ConfigError, StoreError
-        as `run`; also if the model is a formula, or there are fewer than two axes.
+        as `run`; also if the model is not simulated, or there are fewer than two axes.
 
     Examples
     --------
@@ -213,7 +213,7 @@ def critical(
     Raises
     ------
     ConfigError, StoreError
-        as `run`; also if the model is a formula, or the start point is an axis.
+        as `run`; also if the model is not simulated, or the start point is an axis.
 
     Examples
     --------
@@ -264,7 +264,7 @@ def trajectory(
     Raises
     ------
     ConfigError
-        if the configuration cannot be used, the model is a formula, or a cell cannot be run.
+        if the configuration cannot be used, the model is not simulated, or a cell cannot be run.
 
     Examples
     --------
@@ -456,7 +456,7 @@ def indices(
     Raises
     ------
     ConfigError, StoreError
-        as `run`; also if the model is a formula, no parameter is a distribution, or one is an axis.
+        as `run`; also if the model is not simulated, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
     from sweep.studies.study import run_study

@@ -17,7 +17,7 @@ from contextvars import ContextVar
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from threading import RLock
+from threading import RLock, current_thread
 from typing import Any
 
 import numpy as np
@@ -173,19 +173,24 @@ def on_all_threads(function: Callable[[Any], Any], items: Sequence[Any]) -> list
     """Call `function` for each of `items`, and return what it returns.
 
     It has to spend its time in functions of `serial`, or in those of NumPy that let other threads run, as LAPACK's do.
+    Called on one of these threads, it uses that thread alone.
     """
     shares = [items[i :: 4 * threads()] for i in range(min(len(items), 4 * threads()))]
-    over = map if INTERPRETED or len(shares) == 1 else _pool(threads()).map
+    within = current_thread().name.startswith(_POOL)
+    over = map if INTERPRETED or len(shares) == 1 or within else _pool(threads()).map
     found: list[Any] = [None] * len(items)
     for i, results in enumerate(over(lambda share: [*map(function, share)], shares)):
         found[i :: len(shares)] = results
     return found
 
 
+_POOL = "sweep-"
+
+
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
     # It is kept, because threads take a millisecond to start.
-    return ThreadPoolExecutor(threads)
+    return ThreadPoolExecutor(threads, thread_name_prefix=_POOL)
 
 
 # A process that was forked has none of the threads of its parent, and would wait for them for ever.

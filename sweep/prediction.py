@@ -8,13 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.grid import Array, Grid
+from sweep.jit import on_all_threads
 from sweep.kernels.measures.first_reversal import FirstReversal
+from sweep.kernels.measures.foreseen import Foreseen
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
-from sweep.models.ladder import analytic
+from sweep.models.ladder import analytic, slip, slow
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
+from sweep.models.slow.foresee import foresee
 from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
+
+# Cells that a thread foresees at once; a cell takes a millisecond.
+_SOME = 64
 
 # Bodies whose eigenvalues are found at once (about 60 MB); a body takes 0.1 ms.
 _PART = 4096
@@ -37,9 +43,12 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
 
     Parameters
     ----------
-    measure : the measurements to be predicted; the time of the first reversal is if "first_reversal" is among them
+    measure : the measurements to be predicted: the time of the first reversal if "first_reversal" is among them, and
+        the count by the slow equations if "foreseen" is
     """
     found = formulas(tier, grid)
+    if tier is slow.MODEL:
+        found |= _foreseen(slip.MODEL, grid.columns())
     if not isinstance(tier, Model):
         return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
     bodies, place = grid.bodies()
@@ -49,6 +58,8 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
         found["n_c1_plus_linear"], found["n_c1_minus_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan)
     if REVERSAL_TIME in tier.offers and FirstReversal.name in measure:
         found |= _reversal_time(tier, grid.columns(), n_c1[:, place])
+    if Foreseen.name in measure:
+        found |= _foreseen(tier, grid.columns())
     return Prediction(found, n_c1, ranges[:, place])
 
 
@@ -62,6 +73,14 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
     with np.errstate(divide="ignore", invalid="ignore"):  # where no upright spin is steady
         time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
     return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}
+
+
+def _foreseen(model: Model, columns: Columns) -> dict[str, Array]:
+    """The count by the slow equations, on all threads."""
+    size = len(next(iter(columns.values())))
+    parts = [slice(begin, begin + _SOME) for begin in range(0, size, _SOME)]
+    found = on_all_threads(lambda some: foresee(model, {k: v[some] for k, v in columns.items()}), parts)
+    return dict(zip(Foreseen.variables, map(np.concatenate, zip(*found, strict=True)), strict=True))
 
 
 def decay_times(model: Model, grid: Grid) -> Array:

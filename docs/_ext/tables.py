@@ -122,7 +122,7 @@ def _methods() -> tuple[Row, list[Row]]:
 def _models() -> tuple[Row, list[Row]]:
     rows = []
     for tier in TIERS.values():
-        used = ", ".join(f"`{m}`" for m in methods.allowed(tier)) if isinstance(tier, Model) else "a formula: none"
+        used = ", ".join(f"`{m}`" for m in methods.allowed(tier)) if isinstance(tier, Model) else "none"
         states = ", ".join(f"`{s}`" for s in tier.states) if isinstance(tier, Model) else ""
         possible = ", ".join(f"`{m}`" for m in measures.possible(tier))
         rows.append((f"`{tier.name}`", tier.summary, states, used, possible))

@@ -151,7 +151,7 @@ class Config:
 
     @property
     def simulated(self) -> bool:
-        """True if the model is simulated, False if it is a formula."""
+        """Return whether the model is simulated; formulas and the slow equations are evaluated."""
         return isinstance(self.tier, Model)
 
     @property

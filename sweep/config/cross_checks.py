@@ -127,7 +127,7 @@ def _of_integrator(config: Config) -> Iterator[Misfit]:
 
 def _of_refinement(config: Config) -> Iterator[Misfit]:
     if not config.simulated:
-        yield ("refine",), f"needs a simulation, but the {config.model} model is a formula; set it to 0"
+        yield ("refine",), f"needs a simulation, and the {config.model} model is not simulated; set it to 0"
     if config.cases:
         yield ("refine",), f"cannot be combined with {config.row}s, which have no neighbours; set it to 0"
     if "reversals" not in config.measure:

@@ -94,9 +94,9 @@ def split(grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], cells: int, mo
 
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
-    """Return the results of a model that is a formula."""
+    """Return the results of a model that is not simulated."""
     arrays = predict(config.tier, grid).variables
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
-        arrays["reversals"] = arrays["reversals_predicted"]
+        arrays["reversals"] = arrays.get("reversals_foreseen", arrays["reversals_predicted"])
     return arrays

@@ -41,7 +41,7 @@ def measuring(config: Config) -> Config:
 
 
 def require_certain(config: Config) -> None:
-    """Raise a `ConfigError` if the model is a formula, or a parameter is a distribution."""
+    """Raise a `ConfigError` if the model is not simulated, or a parameter is a distribution."""
     require_simulated(config)
     for name in config.distributions:
         words = "is a distribution, which only run can sample; give a number or an axis here"
@@ -49,9 +49,9 @@ def require_certain(config: Config) -> None:
 
 
 def require_simulated(config: Config) -> None:
-    """Raise a `ConfigError` if the model is a formula, which takes no steps."""
+    """Raise a `ConfigError` if the model is not simulated."""
     if not config.simulated:
-        message = f"the {config.model} model is a formula and cannot be simulated; choose {either(MODELS)}"
+        message = f"the {config.model} model is not simulated; choose {either(MODELS)}"
         raise ConfigError([config.fault(("model",), message)])
 
 

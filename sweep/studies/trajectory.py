@@ -137,7 +137,7 @@ def trajectory(
     Raises
     ------
     ConfigError
-        if the model is a formula, `at` selects cells that cannot be run, or the samples do not fit into memory.
+        if the model is not simulated, `at` selects cells that cannot be run, or the samples do not fit into memory.
     """
     if every is not None and not (is_number(each := plain_data(every)) and 0 < each < inf):
         raise fault_of(refusal(every, "a finite number > 0"), "every")

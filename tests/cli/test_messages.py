@@ -44,7 +44,7 @@ MEANT = {
     "run c.yaml --set name.first=3": "--set name.first: name is a value, not a section; name a key such as friction.mu",
     "run c.yaml --set mu=1..2:100000 --set n0=1..2:100000": "0 cells are too many",
     "critical c.yaml --set x0=[0.01,0.02]": "--set x0: cannot be an axis of critical spins; give one number",
-    "critical c.yaml --set model=analytic": "the analytic model is a formula and cannot be simulated; choose slip",
+    "critical c.yaml --set model=analytic": "the analytic model is not simulated; choose slip",
     "trajectory c.yaml --at mu": "--at mu: must be NAME=VALUE",
 }  # fmt: skip
 

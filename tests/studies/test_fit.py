@@ -442,7 +442,7 @@ def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: 
         ),
         (["mu", "n0", "x0", "y0", "a", "b", "delta", "film_delay", "film_bias"], {}, "9 parameters are free"),
         (["mu", "n0", "delta"], {"delta": 0.0}, "give the ends of its range as two values"),
-        (["mu"], {"model": "analytic", "n0": 0.05}, "is a formula and cannot be simulated"),
+        (["mu"], {"model": "analytic", "n0": 0.05}, "is not simulated"),
         (["mu"], {"laws": ["viscuos"]}, "viscuos is not a law of friction (did you mean viscous?); choose from vis"),
     ],
 )

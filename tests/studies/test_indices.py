@@ -94,7 +94,7 @@ def test_the_command_resumes_and_says_what_it_found(write: Write, tmp_path: Path
     ("old", "new", "words"),
     [
         ("b: 3", "b: [3, 4]", "body.b: cannot be an axis of indices; give one number"),
-        ("model: averaged", "model: analytic", "is a formula and cannot be simulated"),
+        ("model: averaged", "model: analytic", "is not simulated"),
         (SCENE, "friction: {mu: 60}\n", "no parameter is a distribution; give one"),
     ],
 )

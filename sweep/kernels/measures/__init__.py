@@ -8,6 +8,7 @@ from sweep.kernels.measures.cycles import Cycles
 from sweep.kernels.measures.decay import Decay
 from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.first_reversal import FirstReversal
+from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.lyapunov import Lyapunov
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
@@ -21,7 +22,7 @@ from sweep.models.model import Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
     Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Cycles,
-    Lyapunov, Misfit,
+    Lyapunov, Misfit, Foreseen,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}

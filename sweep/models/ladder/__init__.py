@@ -1,1 +1,1 @@
-"""The paper's ladder of models, one file each: slip, noslip, effective, averaged, and the formulas."""
+"""The paper's ladder of models, one file each: slip, noslip, effective, averaged, slow, and the formulas."""

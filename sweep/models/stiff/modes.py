@@ -31,7 +31,7 @@ RATTLE = (0, 1, 2, 3, 5, 6)
 """Indices of the states that vanish in upright spin; the remaining one is then M3 = -J33 n."""
 
 # Decay rate of the slip, in sqrt(g/h), above which friction counts as stopping the slip fast compared with the rattle.
-_SLIP_DECAY = 0.3
+SLIP_DECAY = 0.3
 
 # Amplitude at which quadratic forms are evaluated: the neglected terms are 1e-16 of them.
 _SMALL = 1e-8
@@ -167,7 +167,7 @@ def _rocking(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array
     # With little friction the slip is not stopped fast, but oscillates slowly, which these two modes do not describe:
     # at μ = 1e-3 neglecting it cost 3e-7 in spin.
     falling = np.argsort(-rates.imag, axis=1)
-    fast = np.take_along_axis(rates.real, falling[:, 2:4], axis=1) < -_SLIP_DECAY * form.unit(constants)[:, None]
+    fast = np.take_along_axis(rates.real, falling[:, 2:4], axis=1) < -SLIP_DECAY * form.unit(constants)[:, None]
     order = falling[:, 1::-1]
     rates = np.take_along_axis(rates, order, axis=1)
     modes = np.take_along_axis(modes, order[:, None, :], axis=2).astype(complex)

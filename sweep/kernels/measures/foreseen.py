@@ -1,0 +1,26 @@
+"""The count by the slow equations (`sweep.models.ladder.slow`), which stands beside the simulated one."""
+
+from __future__ import annotations
+
+from sweep.kernels.measures.measurement import Measurement
+from sweep.models.model import MODES
+from sweep.units import NUMBER
+from sweep.variables import Variable
+
+
+class Foreseen(Measurement):
+    """The engine predicts it; nothing is measured in the kernel."""
+
+    name = "foreseen"
+    summary = "reversals by the slow equations, without the oscillations, and whether they are sure"
+    asks = MODES
+    variables = {
+        "reversals_foreseen": Variable(
+            "int16", NUMBER, "spin reversals, foreseen", "Spin reversals by the slow equations of the `slow` model."
+        ),
+        "foreseen_sure": Variable(
+            "int8", NUMBER, "is the foreseen count sure?",
+            "Whether the foreseen count stays the same if the terms of higher order change by a fifth.",
+            {0: "unsure", 1: "sure"},
+        ),
+    }  # fmt: skip

@@ -1,0 +1,392 @@
+"""The slow equations of a body: how its two rocking modes and its spin act on each other.
+
+Let E be the modes at rest, with 2 E_k / J33 = |a_k|² for the energy of an amplitude a_k.  At a spin n the rattle is
+
+    x = 2 Re E (a + Y a + w),   n_fast = n + 2 Re Σ q_jk a_j a_k,                                            (1)
+
+where Y has no part along E, w is cubic in a and its conjugate, and the last sum is the ripple.  Then
+
+    a' = (C + T[a a*]) a,   n' = Σ H_jk a_j a_k* + Q[a a* a a*]                                             (2)
+
+up to terms of order |a|⁵ and |a|⁶.  A Y, Y, C solve (A - C) (1 + Y) = 0 for the Jacobian A of the full model at n, so
+that C holds the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2):
+their harmonics that are not resonant, divided by their frequencies.  Unlike modes at n, all these are smooth functions
+of n where the two frequencies meet.  They are computed at five spins, with polynomials between them.
+
+The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory
+reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
+T and Q are divided by 1 + κ |a|², with one κ for each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.jit import called
+from sweep.models.model import Model
+from sweep.models.theory.linear import NODES
+
+RATTLE = (0, 1, 2, 3, 5, 6)
+"""Indices of the states of the full model that vanish in upright spin."""
+
+# Phases of each mode; the equations are odd, so the second mode needs only half a turn.
+_PHASES = 8
+_TURN = np.exp(2j * np.pi * np.arange(_PHASES) / _PHASES)
+
+# Products of a_1, a_2, a_1*, a_2*, by their exponents.
+SECOND = np.array([(2, 0, 0, 0), (1, 1, 0, 0), (0, 2, 0, 0)])
+THIRD = np.array([(2, 0, 1, 0), (1, 1, 0, 1), (1, 1, 1, 0), (0, 2, 0, 1), (2, 0, 0, 1), (0, 2, 1, 0),
+                  (3, 0, 0, 0), (2, 1, 0, 0), (1, 2, 0, 0), (0, 3, 0, 0)])  # fmt: skip
+TERMS = 25
+"""C in rows, H_11, H_22, H_12, T in rows, and Q: of |a_1|⁴, |a_1 a_2|², |a_2|⁴, |a_1|² a_1 a_2*, |a_2|² a_1 a_2*,
+(a_1 a_2*)²."""
+RESONANT = 6
+"""The first ones of `THIRD` turn as a_1 or a_2 do where the frequencies meet: they are the terms of T."""
+
+# Harmonics (of the first phase, of the second) of the products of third order, and of the spin's change.
+_ODD = np.array([(1, 0), (1, 0), (0, 1), (0, 1), (2, -1), (-1, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
+_EVEN = np.array([(0, 0), (1, -1), (2, -2), (2, 0), (1, 1), (0, 2)])
+_PLACES = np.stack(np.meshgrid(np.arange(_PHASES), np.arange(_PHASES), indexing="ij"), axis=-1)
+_ODD_TURNS, _EVEN_TURNS = (_TURN[-(_PLACES @ each.T) % _PHASES] for each in (_ODD, _EVEN))
+
+# Amplitudes for the ripple, for w, for T and Q, and for κ, in units of the fastest spin within reach.
+_TINY, _SMALL, _USUAL, _LARGE = 1e-4, 0.1, 0.3, 0.9
+
+# The least difference of frequencies by which a term of w is divided, relative to a frequency.
+_NEAR = 0.02
+
+# The iterations for Y converge as powers of the spin in units of a frequency.
+_ITERATIONS = 16
+
+
+def _rows(products: np.ndarray) -> np.ndarray:
+    """Rows (product, other, i, j, times): by a' = C a, the product changes by `times` C_ij times the other product.
+
+    For i = 2 and 3 it is the conjugate of C_0j and C_1j.
+    """
+    place, rows = {tuple(each): k for k, each in enumerate(products.tolist())}, []
+    for k, powers in enumerate(products.tolist()):
+        for i in range(4):
+            for j in range(2 * (powers[i] > 0)):
+                other = [*powers]
+                other[i] -= 1
+                other[j + i // 2 * 2] += 1
+                rows.append((k, place[tuple(other)], i, j, powers[i]))
+    return np.array(rows)
+
+
+_OF_SECOND, _OF_THIRD = _rows(SECOND), _rows(THIRD)
+_FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
+_SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ _FIT
+"""Takes values at `NODES` to the derivative there of the polynomial through them."""
+
+
+@called
+def _clear(matrix):
+    """Set a matrix to zero.  Loops compile in a fifth of the time that Numba takes for expressions of arrays."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = 0.0
+
+
+@called
+def _product(A, B, result):
+    """`result` = A B."""
+    for i in range(A.shape[0]):
+        for k in range(B.shape[1]):
+            total = 0.0j
+            for j in range(A.shape[1]):
+                total += A[i, j] * B[j, k]
+            result[i, k] = total
+
+
+@called
+def _solve(M, x, least):
+    """Solve M x = b by elimination without pivots; b is in `x`, and both are overwritten.
+
+    Where a pivot is smaller than `least`, it is made as large.
+    """
+    for k in range(len(x)):
+        pivot = M[k, k] if abs(M[k, k]) > least else least * M[k, k] / abs(M[k, k])
+        for i in range(k + 1, len(x)):
+            share = M[i, k] / pivot
+            for j in range(k + 1, len(x)):
+                M[i, j] -= share * M[k, j]
+            x[i] -= share * x[k]
+        M[k, k] = pivot
+    for k in range(len(x) - 1, -1, -1):
+        for j in range(k + 1, len(x)):
+            x[k] -= M[k, j] * x[j]
+        x[k] /= M[k, k]
+
+
+@called
+def _minus(A, rate, M):
+    """M = A - rate."""
+    for i in range(len(M)):
+        for j in range(len(M)):
+            M[i, j] = A[i, j]
+        M[i, i] -= rate
+
+
+@called
+def _derivation(rows, C, D):
+    """The matrix D in m' = D m, for products m of amplitudes with a' = C a."""
+    _clear(D)
+    for product, other, i, j, times in rows:
+        D[product, other] += times * (C[i, j] if i < 2 else np.conj(C[i - 2, j]))
+
+
+@called
+def _follow_modes(A, Y, C):
+    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest."""
+    M, x = np.empty((4, 4), A.dtype), np.empty(4, A.dtype)
+    _clear(Y)
+    for _ in range(_ITERATIONS):
+        _product(A[:2, 2:], Y, C)
+        for j in range(2):
+            C[0, j], C[1, j] = C[0, j] + A[0, j], C[1, j] + A[1, j]
+        for j in range(2):
+            _minus(A[2:, 2:], C[j, j], M)
+            for i in range(4):
+                x[i] = Y[i, 1 - j] * C[1 - j, j] - A[i + 2, j]
+            _solve(M, x, 0.0)
+            for i in range(4):
+                Y[i, j] = x[i]
+
+
+@called
+def _solve_ripple(g, C, q):
+    """Find the ripple q with q D = g, which is overwritten."""
+    D, turned = np.empty((3, 3), q.dtype), np.empty((3, 3), q.dtype)
+    _derivation(_OF_SECOND, C, D)
+    for i in range(3):
+        for j in range(3):
+            turned[i, j] = D[j, i]
+    _solve(turned, g, 0.0)
+    for i in range(3):
+        q[i] = g[i]
+
+
+@called
+def _solve_third(A, C, Y, f, w):
+    """Find w with A w - w D = (1 + Y) T - f, where T is for the resonant terms along E, which w does not have.
+
+    All are in the modes at rest; f and w of shape (6, products).
+    """
+    count = w.shape[1]
+    D, M, x = np.empty((count, count), w.dtype), np.empty((24, 24), w.dtype), np.empty(24, w.dtype)
+    rest = np.empty((4, 4), w.dtype)
+    _derivation(_OF_THIRD, C, D)
+    _product(Y, A[:2, 2:], rest)
+    for i in range(4):
+        for k in range(4):
+            rest[i, k] = A[i + 2, k + 2] - rest[i, k]
+    _fill(rest, D[:RESONANT, :RESONANT], M)
+    for m in range(RESONANT):
+        for i in range(4):
+            x[i * RESONANT + m] = Y[i, 0] * f[0, m] + Y[i, 1] * f[1, m] - f[i + 2, m]
+    least = _NEAR * abs(A[1, 1])
+    _solve(M, x, least)
+    _clear(w)
+    for m in range(RESONANT):
+        for i in range(4):
+            w[i + 2, m] = x[i * RESONANT + m]
+    _fill(A, D[RESONANT:, RESONANT:], M)
+    others = count - RESONANT
+    for i in range(6):
+        for m in range(others):
+            x[i * others + m] = -f[i, RESONANT + m]
+    _solve(M, x, least)
+    for i in range(6):
+        for m in range(others):
+            w[i, RESONANT + m] = x[i * others + m]
+
+
+@called
+def _fill(A, D, M):
+    """The matrix of w -> A w - w D, for w in rows."""
+    width = len(D)
+    _clear(M)
+    for i in range(len(A)):
+        for m in range(width):
+            for k in range(len(A)):
+                M[i * width + m, k * width + m] += A[i, k]
+            for k in range(width):
+                M[i * width + m, i * width + k] -= D[k, m]
+
+
+def make_exchange(model: Model):
+    """Compiled (p, E, E⁻¹, reach, table, bent) -> None, which writes the coefficients of a body, and `amplitudes`.
+
+    `table`, of shape (5, TERMS), gets those of the polynomials in n / `reach` of C, H_11, H_22, H_12, T and Q; and
+    `bent` the two κ.
+    """
+    rhs = model.rhs
+
+    @called
+    def jacobian(n, p, E, inverse, A):
+        """A in the modes at rest.  The equations are odd in the rattle, so a tiny one gives it to the last digits."""
+        by_state, by_mode, x = np.empty((6, 6), E.dtype), np.empty((6, 6), E.dtype), np.zeros(6)
+        for j in range(6):
+            x[j - 1], x[j] = 0.0, _TINY**2
+            slopes, _ = rhs((x[0], x[1], x[2], x[3], -n, x[4], x[5]), p)
+            for i, state in enumerate(RATTLE):
+                by_state[i, j] = slopes[state] / _TINY**2
+        _product(by_state, E, by_mode)
+        _product(inverse, by_mode, A)
+
+    @called
+    def harmonics(sizes, n, p, shape, inverse, q, odd, even):
+        """Harmonics of x' in the modes at rest (`_ODD`) and of ω3' (`_EVEN`), on the torus of amplitudes of `sizes`.
+
+        `shape` is E (1 + Y + w) by states: of shape (6, 2) without w.  As many modes are resolved as `odd` has rows.
+        """
+        _clear(odd)
+        for m in range(len(even)):
+            even[m] = 0.0
+        both = sizes[0] > 0.0 and sizes[1] > 0.0
+        first = _PHASES if both else _PHASES // 2 if sizes[0] > 0.0 else 1
+        second = _PHASES // 2 if sizes[1] > 0.0 else 1
+        share = 1.0 / (first * second)
+        powers, products = np.ones((4, 4), inverse.dtype), np.empty(2 + len(THIRD), inverse.dtype)
+        x = np.empty(6)
+        for i in range(first):
+            for j in range(second):
+                products[0], products[1] = sizes[0] * _TURN[i], sizes[1] * _TURN[j]
+                for k in range(3):
+                    for m in range(2):
+                        powers[k + 1, m] = powers[k, m] * products[m]
+                        powers[k + 1, m + 2] = np.conj(powers[k + 1, m])
+                for m in range(shape.shape[1] - 2):
+                    product = powers[THIRD[m, 0], 0] * powers[THIRD[m, 1], 1]
+                    products[m + 2] = product * powers[THIRD[m, 2], 2] * powers[THIRD[m, 3], 3]
+                for k in range(6):
+                    x[k] = 0.0
+                    for m in range(shape.shape[1]):
+                        x[k] += 2.0 * (shape[k, m] * products[m]).real
+                ripple = q[0] * powers[2, 0] + q[1] * products[0] * products[1] + q[2] * powers[2, 1]
+                slopes, _ = rhs((x[0], x[1], x[2], x[3], 2.0 * ripple.real - n, x[4], x[5]), p)
+                for m in range(len(even)):
+                    even[m] += share * slopes[4] * _EVEN_TURNS[i, j, m]
+                for k in range(len(odd)):
+                    slope = 0.0j
+                    for m, state in enumerate(RATTLE):
+                        slope += inverse[k, m] * slopes[state]
+                    for m in range(odd.shape[1]):
+                        odd[k, m] += share * slope * _ODD_TURNS[i, j, m]
+
+    @called
+    def cubes(size, n, p, shape, inverse, q, linear, found, sums):
+        """Terms of third order of x' in `found`, of shape (modes, products), and Q in `sums`, at an amplitude."""
+        odd, even = np.empty(found.shape, inverse.dtype), np.empty(len(_EVEN), inverse.dtype)
+        cube, square, modes = size**3, size * size, range(len(found))
+        harmonics((size, 0.0), n, p, shape, inverse, q, odd, even)
+        sums[19] = -(even[0] + sums[4] * square) / square**2
+        for k in modes:
+            found[k, 0] = (odd[k, 0] - size * linear[k, 0]) / cube
+        harmonics((0.0, size), n, p, shape, inverse, q, odd, even)
+        sums[21] = -(even[0] + sums[5] * square) / square**2
+        for k in modes:
+            found[k, 3] = (odd[k, 3] - size * linear[k, 1]) / cube
+        size, cube, square = np.sqrt(0.5) * size, np.sqrt(0.125) * cube, 0.5 * square
+        harmonics((size, size), n, p, shape, inverse, q, odd, even)
+        for k in modes:
+            found[k, 1] = (odd[k, 0] - size * linear[k, 0]) / cube - found[k, 0]
+            found[k, 2] = (odd[k, 3] - size * linear[k, 1]) / cube - found[k, 3]
+            for m in range(4, odd.shape[1]):
+                found[k, m] = odd[k, m] / cube
+        sums[20] = -(even[0] + (sums[4] + sums[5]) * square) / square**2 - sums[19] - sums[21]
+        beats, sums[24] = -(even[1] + sums[6] * square) / square**2, -even[2] / square**2
+        harmonics((np.sqrt(1.6) * size, np.sqrt(0.4) * size), n, p, shape, inverse, q, odd, even)
+        sums[22] = -((even[1] / (0.8 * square) + sums[6]) / (2.0 * square) + 0.2 * beats) / 0.6
+        sums[23] = beats - sums[22]
+
+    @called
+    def terms(n, reach, p, E, inverse, A, C, Y, slope, rest, bent, sums):
+        """All coefficients at one spin, and the κ at rest; `slope` is the derivative of Y by n."""
+        basis, linear, shape = np.zeros((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
+        q, w, found = np.zeros(3, E.dtype), np.empty((6, len(THIRD)), E.dtype), np.empty((6, len(THIRD)), E.dtype)
+        none, even, large = np.empty((0, len(THIRD)), E.dtype), np.empty(len(_EVEN), E.dtype), np.empty(TERMS, E.dtype)
+        squares, g = np.zeros((2, 2)), np.empty(3, E.dtype)
+        for i in range(2):
+            basis[i, i] = 1.0
+            for j in range(2):
+                sums[2 * i + j] = C[i, j]
+            for k in range(4):
+                basis[k + 2, i] = Y[k, i]
+        _product(A, basis, linear)
+        small = shape[:, :2]
+        _product(E, basis, small)
+        tiny = _TINY * reach
+        harmonics((tiny, 0.0), n, p, small, inverse, q, none, even)
+        sums[4] = -even[0] / tiny**2
+        harmonics((tiny, tiny), n, p, small, inverse, q, none, even)
+        sums[5], sums[6] = -even[0] / tiny**2 - sums[4], -even[1] / tiny**2
+        for k in range(3):
+            g[k] = even[k + 3] / tiny**2
+        _solve_ripple(g, C, q)
+        cubes(_SMALL * reach, n, p, small, inverse, q, linear, found, sums)
+        for m in range(RESONANT):  # Y depends on the spin, which changes
+            for i in range(2):
+                if THIRD[m, i]:
+                    j, other = 0 if THIRD[m, 0] > (i == 0) else 1, 0 if THIRD[m, 2] else 1
+                    turn = sums[4 + j] if j == other else sums[6] if j == 0 else np.conj(sums[6])
+                    for k in range(4):
+                        found[k + 2, m] -= slope[k, i] * turn
+        _solve_third(A, C, Y, found, w)
+        _product(E, w, shape[:, 2:])
+        cubes(_USUAL * reach, n, p, shape, inverse, q, linear, found[:2], sums)
+        for i in range(2):
+            for m in range(RESONANT):
+                sums[7 + i * RESONANT + m] = found[i, m]
+        if rest:
+            for k in range(7):
+                large[k] = sums[k]
+            cubes(_LARGE * reach, n, p, shape, inverse, q, linear, found[:2], large)
+            for i in range(2):
+                for m in range(RESONANT):
+                    large[7 + i * RESONANT + m] = found[i, m]
+            for k in range(7, TERMS):
+                squares[0, k // 19] += abs(sums[k]) ** 2
+                squares[1, k // 19] += abs(large[k]) ** 2
+            for k in range(2):
+                ratio = np.sqrt(squares[0, k] / squares[1, k])
+                bent[k] = (ratio - 1.0) / (reach * reach * (_LARGE**2 - ratio * _USUAL**2))
+
+    @called
+    def exchange(p, E, inverse, reach, table, bent):
+        A, C, Y = np.empty((5, 6, 6), E.dtype), np.empty((5, 2, 2), E.dtype), np.empty((5, 4, 2), E.dtype)
+        sums, slope = np.empty((5, TERMS), E.dtype), np.empty((4, 2), E.dtype)
+        for k in range(5):
+            jacobian(NODES[k] * reach, p, E, inverse, A[k])
+            _follow_modes(A[k], Y[k], C[k])
+        for k in range(5):
+            _clear(slope)
+            for j in range(5):
+                for i in range(4):
+                    for m in range(2):
+                        slope[i, m] += _SLOPE[k, j] / reach * Y[j, i, m]
+            terms(NODES[k] * reach, reach, p, E, inverse, A[k], C[k], Y[k], slope, k == 0, bent, sums[k])
+        _clear(table)
+        for m in range(TERMS):
+            straight = 1.0 + bent[m // 19] * (_USUAL * reach) ** 2 if m >= 7 else 1.0
+            for k in range(5):
+                for j in range(5):
+                    table[k, m] += straight * _FIT[k, j] * sums[j, m]
+
+    @called
+    def amplitudes(x, n, p, E, inverse):
+        """The amplitudes a of a small rattle x at a spin n."""
+        A, C, Y = np.empty((6, 6), E.dtype), np.empty((2, 2), E.dtype), np.empty((4, 2), E.dtype)
+        jacobian(n, p, E, inverse, A)
+        _follow_modes(A, Y, C)
+        z1, z2 = 0.0j, 0.0j
+        for k in range(6):
+            z1, z2 = z1 + inverse[0, k] * x[k], z2 + inverse[1, k] * x[k]
+        a1, a2 = z1, z2
+        for _ in range(_ITERATIONS):  # a + Y* a* = z, where these rows of Y belong to the conjugates
+            a1, a2 = z1 - np.conj(Y[0, 0] * a1 + Y[0, 1] * a2), z2 - np.conj(Y[1, 0] * a1 + Y[1, 1] * a2)
+        return a1, a2
+
+    return exchange, amplitudes

@@ -1,0 +1,184 @@
+"""Follows the slow equations to their end, and counts the reversals on the way.
+
+Within a step the spin and the coefficients stay as they are in its middle.  The amplitudes then turn and grow as the
+modes of a 2 × 2 matrix do, and their products, which drive the spin, are integrated exactly over the step.  So a step
+may be long compared with the beat of the modes, unless the beat is slow enough for T to act on it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.jit import called, inline
+
+# A step turns the spin by no more than this share of what a mode can, and advances the beat by no more than this phase
+# where T changes the rates by more than a share `_ACTS` of the frequency of the beat.
+_TURN, _BEAT, _ACTS = 0.02, 1.0, 0.02
+
+# It is over when both modes decay and can change the spin by no more than this share.
+_OVER, _MOST_STEPS = 1e-3, 3000
+
+# Spins beyond this many times what the energy allows are of no motion.
+_FAR = 3.0
+
+# Where the modes meet they are taken to differ by this share of the matrix, and amplitudes may fall below what a number
+# can hold.
+_APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
+
+
+@inline
+def _square(z):
+    """|z|², without the root that abs takes."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@inline
+def _quotient(a, b):
+    """a/b, without the checks of a complex division."""
+    return a * np.conj(b) * (1.0 / _square(b))
+
+
+@called
+def _at(table, x, sums):
+    """The coefficients at a spin."""
+    for k in range(len(sums)):
+        sums[k] = table[4, k]
+    for j in range(3, -1, -1):
+        for k in range(len(sums)):
+            sums[k] = sums[k] * x + table[j, k]
+
+
+@inline
+def _rates(sums, by, e1, e2, beat):
+    """C with T, divided by `by`, for products of the amplitudes: e_1, e_2 and `beat`, which is a_1 a_2*."""
+    back = np.conj(beat)
+    return (
+        sums[0] + (sums[7] * e1 + sums[8] * e2 + sums[11] * beat) / by,
+        sums[1] + (sums[9] * e1 + sums[10] * e2 + sums[12] * back) / by,
+        sums[2] + (sums[13] * e1 + sums[14] * e2 + sums[17] * beat) / by,
+        sums[3] + (sums[15] * e1 + sums[16] * e2 + sums[18] * back) / by,
+    )
+
+
+@inline
+def _turning(sums, by, e1, e2, beat):
+    """n' with Q, divided by `by`."""
+    pairs = sums[19].real * e1 * e1 + sums[20].real * e1 * e2 + sums[21].real * e2 * e2
+    pairs += 2.0 * ((sums[22] * e1 + sums[23] * e2 + sums[24] * beat) * beat).real
+    return sums[4].real * e1 + sums[5].real * e2 + 2.0 * (sums[6] * beat).real + pairs / by
+
+
+@called
+def _modes(C):
+    """Eigenvalues and eigenvectors of a 2 × 2 matrix, (λ_1, λ_2, (V_11, V_12, V_21, V_22))."""
+    c11, c12, c21, c22 = C
+    middle, half = 0.5 * (c11 + c22), 0.5 * (c11 - c22)
+    root, scale = np.sqrt(half * half + c12 * c21), np.sqrt(_square(c12) + _square(c21) + _square(half))
+    root = root if _square(root) > (_APART * scale) ** 2 else _APART * scale + 0j
+    root = root if (half * np.conj(root)).real >= 0 else -root
+    big = half + root
+    norm1, norm2 = np.sqrt(_square(big) + _square(c21)) + _TINY, np.sqrt(_square(big) + _square(c12)) + _TINY
+    return middle + root, middle - root, (big / norm1, -c12 / norm2, c21 / norm1, big / norm2)
+
+
+@inline
+def _resolved(a1, a2, V):
+    """The amplitudes of the modes V."""
+    by = _quotient(1.0, V[0] * V[3] - V[1] * V[2])
+    return by * (V[3] * a1 - V[1] * a2), by * (V[0] * a2 - V[2] * a1)
+
+
+@inline
+def _until(way, turn, rate):
+    """The time in which a mode of a rate turns the spin by `way`: longer than any step if it never does."""
+    turned = 2.0 * rate * way / (turn + _TINY)
+    if turned <= -1.0:
+        return _LONG
+    return way / (turn + way / _LONG) if abs(turned) < 1e-6 else np.log1p(turned) / (2.0 * rate)
+
+
+@inline
+def _mean(after, turn):
+    """The mean over a step of an exponential that is 1 before it and `after` = exp(turn) at its end."""
+    return 1.0 + 0.5 * turn if abs(turn.real) + abs(turn.imag) < 1e-6 else _quotient(after - 1.0, turn)
+
+
+@called
+def _means(z1, z2, turn1, turn2, after1, after2, V):
+    """The means of |a_1|², |a_2|² and a_1 a_2* over a step in which modes of amplitudes z grow by exp(turn)."""
+    e1 = _square(z1) * _mean(_square(after1), 2.0 * turn1.real)
+    e2 = _square(z2) * _mean(_square(after2), 2.0 * turn2.real)
+    cross = z1 * np.conj(z2) * _mean(after1 * np.conj(after2), turn1 + np.conj(turn2))
+    first = _square(V[0]) * e1 + _square(V[1]) * e2 + 2.0 * (V[0] * np.conj(V[1]) * cross).real
+    second = _square(V[2]) * e1 + _square(V[3]) * e2 + 2.0 * (V[2] * np.conj(V[3]) * cross).real
+    beat = V[0] * np.conj(V[2]) * e1 + V[1] * np.conj(V[3]) * e2
+    return first, second, beat + V[0] * np.conj(V[3]) * cross + V[1] * np.conj(V[2]) * np.conj(cross)
+
+
+@called
+def follow(a1, a2, n, table, bent, reach, size):
+    """Follow the slow equations from (a_1, a_2, n).
+
+    Parameters
+    ----------
+    table, bent, reach : the coefficients of `sweep.models.slow.exchange`
+    size : factor of T and Q, 1 but for a test of how much depends on them
+
+    Returns
+    -------
+    The number of reversals, and whether the equations describe the motion to its end.  Changes of sign are those of the
+    spin without its beat, H_12 a_1 a_2* / (i ω_1 - i ω_2) at rest, as the simulated count is of the ripple-free spin.
+    """
+    sums = np.empty(table.shape[1], table.dtype)
+    strong = 0.0
+    for k in range(7, 19):
+        strong += 0.5 * _square(table[0, k])
+    strong = size * np.sqrt(strong)
+    beats = 2.0 * table[0, 6] / (1j * (table[0, 0] - table[0, 3]).imag)
+    count, old = 0, n - (beats * a1 * np.conj(a2)).real
+    for _ in range(_MOST_STEPS):
+        e1, e2, beat = _square(a1), _square(a2), a1 * np.conj(a2)
+        _at(table, n / reach, sums)
+        rate1, rate2, V = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
+        z1, z2 = _resolved(a1, a2, V)
+        f1, f2, r1, r2, apart = _square(z1), _square(z2), rate1.real, rate2.real, abs(rate1.imag - rate2.imag)
+        g1, g2, g12 = _turns(sums, V)
+        turn1, turn2, cross = abs(g1) * f1, abs(g2) * f2, 2.0 * abs(g12) * np.sqrt(f1 * f2)
+        left = 0.5 * turn1 / abs(r1) + 0.5 * turn2 / abs(r2) + cross / abs(rate1 + np.conj(rate2))
+        if r1 < 0.0 and r2 < 0.0 and left < _OVER * abs(n):
+            return count, True
+        way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(abs(g1), abs(g2), _TINY))
+        step = min(_until(way, turn1, r1), _until(way, turn2, r2))
+        step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
+        acts = strong * (f1 + f2)
+        if acts > _ACTS * apart:
+            step = min(step, _BEAT / (apart + acts))
+        turned1, turned2 = 0.5 * step * rate1, 0.5 * step * rate2
+        after1, after2 = np.exp(turned1), np.exp(turned2)
+        e1, e2, beat = _means(z1, z2, turned1, turned2, after1, after2, V)
+        middle = n + 0.5 * step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
+        e1, e2, beat = _means(z1, z2, 2.0 * turned1, 2.0 * turned2, after1 * after1, after2 * after2, V)
+        _at(table, middle / reach, sums)
+        rate1, rate2, V = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
+        z1, z2 = _resolved(a1, a2, V)
+        after1, after2 = np.exp(step * rate1), np.exp(step * rate2)
+        e1, e2, beat = _means(z1, z2, step * rate1, step * rate2, after1, after2, V)
+        n += step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
+        z1, z2 = z1 * after1, z2 * after2
+        a1, a2 = V[0] * z1 + V[1] * z2, V[2] * z1 + V[3] * z2
+        new = n - (beats * a1 * np.conj(a2)).real
+        count, old = count + (new * old < 0.0), new
+        if not abs(n) < _FAR * reach:
+            break
+    return count, False
+
+
+@called
+def _turns(sums, V):
+    """H in the modes V: of each, and of both."""
+    h1, h2, h12 = sums[4].real, sums[5].real, sums[6]
+    one = h1 * _square(V[0]) + h2 * _square(V[2]) + 2.0 * (h12 * V[0] * np.conj(V[2])).real
+    other = h1 * _square(V[1]) + h2 * _square(V[3]) + 2.0 * (h12 * V[1] * np.conj(V[3])).real
+    both = h1 * V[0] * np.conj(V[1]) + h2 * V[2] * np.conj(V[3])
+    both += h12 * V[0] * np.conj(V[3]) + np.conj(h12) * V[2] * np.conj(V[1])
+    return one, other, both

@@ -1,0 +1,86 @@
+"""The slow equations against the full model: its eigenvalues, its counts, and its symmetries."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.models.ladder import slip
+from sweep.models.slow import foresee as slow
+from sweep.models.slow.exchange import TERMS, make_exchange
+from sweep.models.theory import linear
+
+LINE: dict[str, Any] = {"body": {"b": {"start": 1.5, "stop": 9.5, "num": 9}}, "friction": {"mu": [30, 80, 150]}}
+
+
+def columns(**given: Any) -> dict[str, np.ndarray]:
+    found = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "mu": 100.0, "n0": 0.05, "x0": 0.01, "y0": 0.01} | given
+    return {name: np.atleast_1d(np.asarray(value, float)) for name, value in found.items()}
+
+
+def test_the_matrix_has_the_eigenvalues_of_the_full_model() -> None:
+    """At spins between those through which its polynomials go, also where the modes nearly meet."""
+    for b in (2.0, 5.0, 9.4):
+        body = columns(b=b)
+        p = slip.MODEL.constants.of(body)
+        _, modes = slow._modes_at_rest(slip.MODEL, p)
+        E = slow._of_unit_energy(slip.MODEL, p, modes)[0]
+        exchange, _ = make_exchange(slip.MODEL)
+        table, reach = np.empty((5, TERMS), complex), 0.05
+        exchange(type(p)(*(each[0] for each in p)), E, np.linalg.inv(E), reach, table, np.empty(2))
+        for x in (0.3, -0.8):
+            C = (table[:, :4].T @ x ** np.arange(5)).reshape(2, 2)
+            full = np.linalg.eigvals(linear.jacobian(slip.MODEL, p, np.array([x * reach])))[0]
+            rocking = full[np.argsort(-full.imag)[:2]]
+            np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(C)), np.sort_complex(rocking), rtol=2e-6)
+
+
+@pytest.mark.parametrize(("n0", "share"), [(0.02, 1.0), (0.05, 0.85)])
+def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
+    asked = LINE | {"start": {"n0": n0}, "measure": ["reversals", "foreseen"]}
+    found = sweep.run(asked)
+    right = (found.reversals == found.reversals_foreseen).values
+    assert right.mean() >= share
+    assert right[found.foreseen_sure.values == 1].all()
+    assert found.foreseen_sure.mean() > 0.4
+    # The formula alone is right in a third of these.
+    assert right.mean() > (found.reversals == found.reversals_predicted).mean() + 0.2
+    assert found.reversals_foreseen.identical(sweep.predict(asked).reversals_foreseen)
+    alone = sweep.run(LINE | {"start": {"n0": n0}, "model": "slow"})
+    np.testing.assert_array_equal(alone.reversals, found.reversals_foreseen)
+    np.testing.assert_array_equal(alone.reversals_foreseen, found.reversals_foreseen)
+
+
+def test_a_cell_is_the_same_alone_and_mirrored() -> None:
+    some = columns(b=[1.6, 4.0, 7.0, 9.0], mu=[40.0, 60.0, 120.0, 90.0], n0=[0.05, -0.05, 0.08, 0.03])
+    some = {name: np.broadcast_to(values, 4).copy() for name, values in some.items()}
+    together = slow.foresee(slip.MODEL, some)
+    mirrored = slow.foresee(slip.MODEL, some | {name: -some[name] for name in ("delta", "n0", "y0")})
+    np.testing.assert_array_equal(together.reversals, mirrored.reversals)
+    for i in range(4):
+        one = slow.foresee(slip.MODEL, {name: values[i : i + 1] for name, values in some.items()})
+        assert one.reversals[0] == together.reversals[i]
+        assert one.sure[0] == together.sure[i]
+
+
+def test_bodies_without_two_rocking_modes_are_not_sure() -> None:
+    """One that cannot stand, one that hardly slips, and one that is nearly round."""
+    some = columns(b=[0.5, 3.0, 1.00001], mu=[60.0, 1e-4, 60.0])
+    found = slow.foresee(slip.MODEL, {name: np.broadcast_to(values, 3).copy() for name, values in some.items()})
+    assert not found.sure.any()
+    assert (found.reversals[:2] == 0).all()
+
+
+def test_a_body_in_si_has_the_same_counts() -> None:
+    """Given by lengths and times, with gravity, where the equations are those of another variant."""
+    paper = sweep.run(LINE | {"model": "slow"})
+    length, gravity = 0.02, 9.80665
+    rate = np.sqrt(gravity / length)
+    b = np.linspace(1.5, 9.5, 9) * length
+    asked = {
+        "units": "SI", "body": {"a": 10 * length, "b": b.tolist(), "c": length, "delta": 0.03, "mass": 1.0},
+        "friction": {"mu": [mu / (length * rate) for mu in (30, 80, 150)]},
+        "start": {"n0": 0.05 * rate, "x0": 0.01 * length, "y0": 0.01 * length}, "measure": ["reversals", "foreseen"],
+    }  # fmt: skip
+    np.testing.assert_array_equal(sweep.predict(asked).reversals_foreseen.values, paper.reversals_foreseen.values)
