@@ -183,7 +183,7 @@ def ladder() -> Section:
     mu, b = np.linspace(20, 200, 19), np.linspace(1.5, 9.0, 16)
     measure = ("reversals", "first_reversal")
     maps = {}
-    for name in (*MODELS, "analytic"):
+    for name in (*MODELS, "slow", "analytic"):
         run(configure(name, t_end=10.0, measure=measure, mu=mu[:1], b=b[:1]))  # compiles
         maps[name] = run(configure(name, t_end=15_000.0, measure=measure, mu=mu, b=b))
     full = maps["slip"]

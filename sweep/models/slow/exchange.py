@@ -217,7 +217,7 @@ def _fill(A, D, M):
 
 
 def make_exchange(model: Model):
-    """Compiled (p, E, E⁻¹, reach, table, bent) -> None, which writes the coefficients of a body, and `amplitudes`.
+    """Compiled (p, E, E⁻¹, reach, table, bent) -> None, which writes the coefficients of a body, and `begin`.
 
     `table`, of shape (5, TERMS), gets those of the polynomials in n / `reach` of C, H_11, H_22, H_12, T and Q; and
     `bent` the two κ.
@@ -277,6 +277,27 @@ def make_exchange(model: Model):
                         odd[k, m] += share * slope * _ODD_TURNS[i, j, m]
 
     @called
+    def small_shape(E, Y, shape):
+        """E (1 + Y): the shape of a small rattle."""
+        basis = np.zeros((6, 2), E.dtype)
+        for i in range(2):
+            basis[i, i] = 1.0
+            for k in range(4):
+                basis[k + 2, i] = Y[k, i]
+        _product(E, basis, shape)
+
+    @called
+    def ripple(size, n, p, shape, inverse, C, q, even):
+        """The ripple q; `even` gets the harmonics of ω3' at two amplitudes of `size`."""
+        none, g = np.empty((0, len(THIRD)), inverse.dtype), np.empty(3, inverse.dtype)
+        for k in range(3):
+            q[k] = 0.0
+        harmonics((size, size), n, p, shape, inverse, q, none, even)
+        for k in range(3):
+            g[k] = even[k + 3] / size**2
+        _solve_ripple(g, C, q)
+
+    @called
     def cubes(size, n, p, shape, inverse, q, linear, found, sums):
         """Terms of third order of x' in `found`, of shape (modes, products), and Q in `sums`, at an amplitude."""
         odd, even = np.empty(found.shape, inverse.dtype), np.empty(len(_EVEN), inverse.dtype)
@@ -305,27 +326,23 @@ def make_exchange(model: Model):
     @called
     def terms(n, reach, p, E, inverse, A, C, Y, slope, rest, bent, sums):
         """All coefficients at one spin, and the κ at rest; `slope` is the derivative of Y by n."""
-        basis, linear, shape = np.zeros((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
+        small, linear, shape = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
         q, w, found = np.zeros(3, E.dtype), np.empty((6, len(THIRD)), E.dtype), np.empty((6, len(THIRD)), E.dtype)
         none, even, large = np.empty((0, len(THIRD)), E.dtype), np.empty(len(_EVEN), E.dtype), np.empty(TERMS, E.dtype)
-        squares, g = np.zeros((2, 2)), np.empty(3, E.dtype)
+        squares = np.zeros((2, 2))
+        small_shape(E, Y, small)
         for i in range(2):
-            basis[i, i] = 1.0
             for j in range(2):
-                sums[2 * i + j] = C[i, j]
-            for k in range(4):
-                basis[k + 2, i] = Y[k, i]
-        _product(A, basis, linear)
-        small = shape[:, :2]
-        _product(E, basis, small)
+                sums[2 * i + j] = linear[i, j] = C[i, j]
+            for k in range(6):
+                shape[k, i] = small[k, i]
+            for k in range(4):  # (1 + Y) C
+                linear[k + 2, i] = Y[k, 0] * C[0, i] + Y[k, 1] * C[1, i]
         tiny = _TINY * reach
         harmonics((tiny, 0.0), n, p, small, inverse, q, none, even)
         sums[4] = -even[0] / tiny**2
-        harmonics((tiny, tiny), n, p, small, inverse, q, none, even)
+        ripple(tiny, n, p, small, inverse, C, q, even)
         sums[5], sums[6] = -even[0] / tiny**2 - sums[4], -even[1] / tiny**2
-        for k in range(3):
-            g[k] = even[k + 3] / tiny**2
-        _solve_ripple(g, C, q)
         cubes(_SMALL * reach, n, p, small, inverse, q, linear, found, sums)
         for m in range(RESONANT):  # Y depends on the spin, which changes
             for i in range(2):
@@ -376,9 +393,10 @@ def make_exchange(model: Model):
                     table[k, m] += straight * _FIT[k, j] * sums[j, m]
 
     @called
-    def amplitudes(x, n, p, E, inverse):
-        """The amplitudes a of a small rattle x at a spin n."""
+    def begin(x, n, reach, p, E, inverse):
+        """The amplitudes a of a rattle x, and the spin without the ripple, at ω3 = -n."""
         A, C, Y = np.empty((6, 6), E.dtype), np.empty((2, 2), E.dtype), np.empty((4, 2), E.dtype)
+        small, q, even = np.empty((6, 2), E.dtype), np.zeros(3, E.dtype), np.empty(len(_EVEN), E.dtype)
         jacobian(n, p, E, inverse, A)
         _follow_modes(A, Y, C)
         z1, z2 = 0.0j, 0.0j
@@ -387,6 +405,8 @@ def make_exchange(model: Model):
         a1, a2 = z1, z2
         for _ in range(_ITERATIONS):  # a + Y* a* = z, where these rows of Y belong to the conjugates
             a1, a2 = z1 - np.conj(Y[0, 0] * a1 + Y[0, 1] * a2), z2 - np.conj(Y[1, 0] * a1 + Y[1, 1] * a2)
-        return a1, a2
+        small_shape(E, Y, small)
+        ripple(_TINY * reach, n, p, small, inverse, C, q, even)
+        return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real
 
-    return exchange, amplitudes
+    return exchange, begin

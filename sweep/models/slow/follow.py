@@ -15,6 +15,10 @@ from sweep.jit import called, inline
 # where T changes the rates by more than a share `_ACTS` of the frequency of the beat.
 _TURN, _BEAT, _ACTS = 0.02, 1.0, 0.02
 
+# Beyond this phase of the beat in a step, the modes keep to themselves as they change with the spin: what a step that
+# is long compared with the beat would excite of one by the other is nothing that the motion does.
+_APART_STEP = 3.0
+
 # It is over when both modes decay and can change the spin by no more than this share.
 _OVER, _MOST_STEPS = 1e-3, 3000
 
@@ -82,10 +86,11 @@ def _modes(C):
 
 
 @inline
-def _resolved(a1, a2, V):
-    """The amplitudes of the modes V."""
-    by = _quotient(1.0, V[0] * V[3] - V[1] * V[2])
-    return by * (V[3] * a1 - V[1] * a2), by * (V[0] * a2 - V[2] * a1)
+def _turned(z1, z2, V, W, keep):
+    """Amplitudes z of the modes V as those of the modes W; with `keep` = 0, each mode keeps to itself."""
+    by = _quotient(1.0, W[0] * W[3] - W[1] * W[2])
+    first = z1 * (W[3] * V[0] - W[1] * V[2]) + keep * z2 * (W[3] * V[1] - W[1] * V[3])
+    return by * first, by * (keep * z1 * (W[0] * V[2] - W[2] * V[0]) + z2 * (W[0] * V[3] - W[2] * V[1]))
 
 
 @inline
@@ -103,16 +108,21 @@ def _mean(after, turn):
     return 1.0 + 0.5 * turn if abs(turn.real) + abs(turn.imag) < 1e-6 else _quotient(after - 1.0, turn)
 
 
+@inline
+def _products(e1, e2, cross, V):
+    """|a_1|², |a_2|² and a_1 a_2*, from the same products of the amplitudes of the modes V."""
+    first = _square(V[0]) * e1 + _square(V[1]) * e2 + 2.0 * (V[0] * np.conj(V[1]) * cross).real
+    second = _square(V[2]) * e1 + _square(V[3]) * e2 + 2.0 * (V[2] * np.conj(V[3]) * cross).real
+    beat = V[0] * np.conj(V[2]) * e1 + V[1] * np.conj(V[3]) * e2
+    return first, second, beat + V[0] * np.conj(V[3]) * cross + V[1] * np.conj(V[2]) * np.conj(cross)
+
+
 @called
 def _means(z1, z2, turn1, turn2, after1, after2, V):
     """The means of |a_1|², |a_2|² and a_1 a_2* over a step in which modes of amplitudes z grow by exp(turn)."""
     e1 = _square(z1) * _mean(_square(after1), 2.0 * turn1.real)
     e2 = _square(z2) * _mean(_square(after2), 2.0 * turn2.real)
-    cross = z1 * np.conj(z2) * _mean(after1 * np.conj(after2), turn1 + np.conj(turn2))
-    first = _square(V[0]) * e1 + _square(V[1]) * e2 + 2.0 * (V[0] * np.conj(V[1]) * cross).real
-    second = _square(V[2]) * e1 + _square(V[3]) * e2 + 2.0 * (V[2] * np.conj(V[3]) * cross).real
-    beat = V[0] * np.conj(V[2]) * e1 + V[1] * np.conj(V[3]) * e2
-    return first, second, beat + V[0] * np.conj(V[3]) * cross + V[1] * np.conj(V[2]) * np.conj(cross)
+    return _products(e1, e2, z1 * np.conj(z2) * _mean(after1 * np.conj(after2), turn1 + np.conj(turn2)), V)
 
 
 @called
@@ -127,22 +137,28 @@ def follow(a1, a2, n, table, bent, reach, size):
     Returns
     -------
     The number of reversals, and whether the equations describe the motion to its end.  Changes of sign are those of the
-    spin without its beat, H_12 a_1 a_2* / (i ω_1 - i ω_2) at rest, as the simulated count is of the ripple-free spin.
+    spin without its beat, Re H_12 a_1 a_2* / (i ω_1 - i ω_2) at rest: the simulated count is of the ripple-free spin.
     """
     sums = np.empty(table.shape[1], table.dtype)
     strong = 0.0
     for k in range(7, 19):
         strong += 0.5 * _square(table[0, k])
     strong = size * np.sqrt(strong)
-    beats = 2.0 * table[0, 6] / (1j * (table[0, 0] - table[0, 3]).imag)
-    count, old = 0, n - (beats * a1 * np.conj(a2)).real
+    far = table[0, 3].imag > 2.0 * table[0, 0].imag
+    at_rest = 2.0 * table[0, 6].real / (1j * (table[0, 0] - table[0, 3]).imag)
+    count, old, keep = 0, 0.0, 1.0
+    z1, z2, V = a1, a2, (1.0 + 0j, 0j, 0j, 1.0 + 0j)
     for _ in range(_MOST_STEPS):
-        e1, e2, beat = _square(a1), _square(a2), a1 * np.conj(a2)
+        e1, e2, beat = _products(_square(z1), _square(z2), keep * z1 * np.conj(z2), V)
         _at(table, n / reach, sums)
-        rate1, rate2, V = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
-        z1, z2 = _resolved(a1, a2, V)
+        rate1, rate2, W = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
+        z1, z2 = _turned(z1, z2, V, W, keep)
+        V = W
         f1, f2, r1, r2, apart = _square(z1), _square(z2), rate1.real, rate2.real, abs(rate1.imag - rate2.imag)
         g1, g2, g12 = _turns(sums, V)
+        beats = 2.0 * _quotient(g12 * z1 * np.conj(z2), rate1 + np.conj(rate2)) if far else at_rest * beat
+        new = n - beats.real
+        count, old = count + (new * old < 0.0), new
         turn1, turn2, cross = abs(g1) * f1, abs(g2) * f2, 2.0 * abs(g12) * np.sqrt(f1 * f2)
         left = 0.5 * turn1 / abs(r1) + 0.5 * turn2 / abs(r2) + cross / abs(rate1 + np.conj(rate2))
         if r1 < 0.0 and r2 < 0.0 and left < _OVER * abs(n):
@@ -153,21 +169,20 @@ def follow(a1, a2, n, table, bent, reach, size):
         acts = strong * (f1 + f2)
         if acts > _ACTS * apart:
             step = min(step, _BEAT / (apart + acts))
+        keep = 0.0 if apart * step > _APART_STEP else 1.0
         turned1, turned2 = 0.5 * step * rate1, 0.5 * step * rate2
         after1, after2 = np.exp(turned1), np.exp(turned2)
         e1, e2, beat = _means(z1, z2, turned1, turned2, after1, after2, V)
         middle = n + 0.5 * step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
         e1, e2, beat = _means(z1, z2, 2.0 * turned1, 2.0 * turned2, after1 * after1, after2 * after2, V)
         _at(table, middle / reach, sums)
-        rate1, rate2, V = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
-        z1, z2 = _resolved(a1, a2, V)
+        rate1, rate2, W = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
+        z1, z2 = _turned(z1, z2, V, W, keep)
+        V = W
         after1, after2 = np.exp(step * rate1), np.exp(step * rate2)
         e1, e2, beat = _means(z1, z2, step * rate1, step * rate2, after1, after2, V)
         n += step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
         z1, z2 = z1 * after1, z2 * after2
-        a1, a2 = V[0] * z1 + V[1] * z2, V[2] * z1 + V[3] * z2
-        new = n - (beats * a1 * np.conj(a2)).real
-        count, old = count + (new * old < 0.0), new
         if not abs(n) < _FAR * reach:
             break
     return count, False
