@@ -24,3 +24,7 @@ class Foreseen(Measurement):
             {0: "unsure", 1: "sure"},
         ),
     }  # fmt: skip
+
+    @property
+    def cost(self) -> float:
+        return 1.2

@@ -1,16 +1,16 @@
 """The slow equations of a body: how its two rocking modes and its spin act on each other.
 
-Let E be the modes at rest, with 2 E_k / J33 = |a_k|² for the energy of an amplitude a_k.  At a spin n the rattle is
+Let E be the modes at rest, with |a_k|² = 2 E_k / J33 for the energy of an amplitude a_k.  The states are
 
-    x = 2 Re E (a + Y a + w),   n_fast = n + 2 Re Σ q_jk a_j a_k,                                            (1)
+    x = 2 Re E (a + Y a + w),   ω3 = -n + 2 Re Σ q_jk a_j a_k,                                               (1)
 
-where Y has no part along E, w is cubic in a and its conjugate, and the last sum is the ripple.  Then
+where Y has no part along the rocking modes, w is cubic in a and its conjugate, and the last sum is the ripple.  Then
 
     a' = (C + T[a a*]) a,   n' = Σ H_jk a_j a_k* + Q[a a* a a*]                                             (2)
 
-up to terms of order |a|⁵ and |a|⁶.  A Y, Y, C solve (A - C) (1 + Y) = 0 for the Jacobian A of the full model at n, so
-that C holds the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2):
-their harmonics that are not resonant, divided by their frequencies.  Unlike modes at n, all these are smooth functions
+up to terms of order |a|⁵ and |a|⁶.  With the Jacobian A of the full model at the spin n, A (1 + Y) = (1 + Y) C, so that
+C has the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2): their
+harmonics that do not turn with a mode, divided by their frequencies.  Unlike modes at n, all these are smooth functions
 of n where the two frequencies meet.  They are computed at five spins, with polynomials between them.
 
 The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory

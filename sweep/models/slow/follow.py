@@ -1,4 +1,4 @@
-"""Follows the slow equations to their end, and counts the reversals on the way.
+"""Follow the slow equations to their end, and count the reversals on the way.
 
 Within a step the spin and the coefficients stay as they are in its middle.  The amplitudes then turn and grow as the
 modes of a 2 × 2 matrix do, and their products, which drive the spin, are integrated exactly over the step.  So a step
