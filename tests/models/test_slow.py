@@ -52,6 +52,22 @@ def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
     np.testing.assert_array_equal(alone.reversals_foreseen, found.reversals_foreseen)
 
 
+@pytest.mark.parametrize(
+    ("given", "what"),
+    [
+        ({"b": 6.4, "mu": 100, "n0": 0.05}, "the spin crosses zero with the beat of the modes, which does not count"),
+        ({"a": 45.57635, "b": 4.04683, "c": 1.59376, "delta": 0.16211, "mu": 83.02952, "n0": 0.00733, "x0": 1.21098,
+          "y0": -0.20595}, "one mode must not excite the other in steps that are longer than their beat"),
+        ({"a": 6.58157, "b": 6.54843, "c": 1.60573, "delta": -0.11106, "mu": 2.1437, "n0": 0.06486, "x0": -0.30049,
+          "y0": -0.26185}, "friction alone couples modes whose frequencies hardly differ"),
+    ],
+)  # fmt: skip
+def test_counts_of_hard_cells(given: dict[str, float], what: str) -> None:
+    case = {name: values.tolist() for name, values in columns(**given).items()}
+    found = sweep.run({"cases": case, "measure": ["reversals", "foreseen"], "integrator": {"method": "auto"}})
+    assert found.reversals_foreseen == found.reversals, what
+
+
 def test_a_cell_is_the_same_alone_and_mirrored() -> None:
     some = columns(b=[1.6, 4.0, 7.0, 9.0], mu=[40.0, 60.0, 120.0, 90.0], n0=[0.05, -0.05, 0.08, 0.03])
     some = {name: np.broadcast_to(values, 4).copy() for name, values in some.items()}
