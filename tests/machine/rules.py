@@ -320,7 +320,8 @@ class Machine(RuleBasedStateMachine):
             few["samples"] = random.choice((1, 2, 3))
         if "measure" in ways:
             few["measure"] = [each for each in (config.document()["measure"]) if each in ("reversals", "margin")][:1]
-            few |= {} if self._allowed(self.scene.with_(few)) else {"measure": config.document()["measure"]}
+            drawn = config.picture or not self._allowed(self.scene.with_(few))  # a picture may need what is left out
+            few |= {"measure": config.document()["measure"]} if drawn else {}
         if "axis" in ways and config.axes:
             name, known = list(config.axes.items())[number % len(config.axes)]
             numbers = [*random.sample(known, len(known)), float(np.mean(known)) * 1.001 or 1e-6]
