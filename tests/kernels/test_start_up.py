@@ -5,6 +5,7 @@ import pytest
 from support import columns
 from support.kernels import finish, images_of, kernel, spin, threads
 
+import sweep
 from sweep.kernels.adams import start_up
 from sweep.kernels.adams.step import HISTORY
 from sweep.kernels.kernel import Kernel
@@ -126,3 +127,14 @@ def test_bodies_that_lift_off_in_start_up_end_there() -> None:
     # They keep sound states, those of the start.
     states = np.stack(PAPER_FORM.model.start(body), axis=-1)
     np.testing.assert_allclose(begin[ended, :7], states[ended], rtol=1e-14, atol=1e-14)
+
+
+def test_slip_at_the_start_turns_the_spin_at_once() -> None:
+    """A start without spin whose slip throws it back, in less than a window: the count is that of dopri5."""
+    asked = {
+        "body": {"a": 8.697805634946704, "b": 2.8487425508457704}, "friction": {"mu": 60.0},
+        "start": {"roll": 0.01, "slip1": 0.021629552082991402}, "measure": ["reversals", "margin"],
+    }  # fmt: skip
+    one, other = (sweep.run(asked, method=method, t_end=100.0) for method in ("adams", "dopri5"))
+    assert one.reversals == other.reversals == 1
+    assert one.margin_fewer == pytest.approx(float(other.margin_fewer), rel=1e-4)

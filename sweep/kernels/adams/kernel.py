@@ -119,6 +119,8 @@ class Adams(Stepper):
 
     def _set_started(self, kernel: Kernel, table: Table, ended: Table, history: Array) -> None:
         """Set the state after start-up, and make up for the looks and measurements that it skipped."""
+        # The slip of a start stops at once, and the spin changes with it, while M stays.
+        table.set_columns(self.model.states[5:], np.zeros((len(history), 2)))
         before = kernel.steady_spin(table.images)
         table.set_columns(self.model.states, ended.columns(self.model.states))
         table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
