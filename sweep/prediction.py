@@ -11,6 +11,7 @@ from sweep.grid import Array, Grid
 from sweep.jit import on_all_threads
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.reversals import Reversals
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.ladder import analytic, slip, slow
@@ -44,10 +45,10 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     Parameters
     ----------
     measure : the measurements to be predicted: the time of the first reversal if "first_reversal" is among them, and
-        the count by the slow equations if "foreseen" is
+        the count by the slow equations if "foreseen" is, or for their own model "reversals"
     """
     found = formulas(tier, grid)
-    if tier is slow.MODEL:
+    if tier is slow.MODEL and Reversals.name in measure:
         found |= _foreseen(slip.MODEL, grid.columns())
     if not isinstance(tier, Model):
         return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
@@ -76,7 +77,7 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
 
 
 def _foreseen(model: Model, columns: Columns) -> dict[str, Array]:
-    """The count by the slow equations, on all threads."""
+    """Return the counts by the slow equations, computed on all threads."""
     size = len(next(iter(columns.values())))
     parts = [slice(begin, begin + _SOME) for begin in range(0, size, _SOME)]
     found = on_all_threads(lambda some: foresee(model, {k: v[some] for k, v in columns.items()}), parts)

@@ -95,7 +95,7 @@ def split(grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], cells: int, mo
 
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     """Return the results of a model that is not simulated."""
-    arrays = predict(config.tier, grid).variables
+    arrays = predict(config.tier, grid, config.measure).variables
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
         arrays["reversals"] = arrays.get("reversals_foreseen", arrays["reversals_predicted"])

@@ -10,6 +10,8 @@ from sweep.models.ladder import slip
 from sweep.models.slow import foresee as slow
 from sweep.models.slow.exchange import TERMS, make_exchange
 from sweep.models.theory import linear
+from sweep.plots import quantities
+from sweep.prediction import predict
 
 LINE: dict[str, Any] = {"body": {"b": {"start": 1.5, "stop": 9.5, "num": 9}}, "friction": {"mu": [30, 80, 150]}}
 
@@ -100,3 +102,17 @@ def test_a_body_in_si_has_the_same_counts() -> None:
         "start": {"n0": 0.05 * rate, "x0": 0.01 * length, "y0": 0.01 * length}, "measure": ["reversals", "foreseen"],
     }  # fmt: skip
     np.testing.assert_array_equal(sweep.predict(asked).reversals_foreseen.values, paper.reversals_foreseen.values)
+
+
+def test_pictures_call_its_counts_foreseen() -> None:
+    """They are not simulated; a run that measures both has simulated ones as well."""
+    alone = sweep.run(LINE | {"model": "slow"})
+    both = sweep.run({"friction": {"mu": [60, 80]}, "measure": ["reversals", "foreseen"]})
+    assert quantities.field(alone, "difference").attrs["long_name"] == "foreseen − predicted"
+    assert quantities.field(both, "difference").attrs["long_name"] == "simulated − predicted"
+
+
+def test_counts_are_not_foreseen_for_critical_spins_alone() -> None:
+    config = sweep.load_config(LINE | {"model": "slow"})
+    assert "reversals_foreseen" not in predict(config.tier, config.grid).variables
+    assert "reversals_foreseen" in predict(config.tier, config.grid, config.measure).variables

@@ -119,7 +119,7 @@ class Adams(Stepper):
 
     def _set_started(self, kernel: Kernel, table: Table, ended: Table, history: Array) -> None:
         """Set the state after start-up, and make up for the looks and measurements that it skipped."""
-        # The slip of a start stops at once, and the spin changes with it, while M stays.
+        # Friction stops the initial slip at once; that changes the spin but not M.
         table.set_columns(self.model.states[5:], np.zeros((len(history), 2)))
         before = kernel.steady_spin(table.images)
         table.set_columns(self.model.states, ended.columns(self.model.states))

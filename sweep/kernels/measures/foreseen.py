@@ -1,4 +1,4 @@
-"""The count by the slow equations (`sweep.models.ladder.slow`), which stands beside the simulated one."""
+"""The count by the slow equations (`sweep.models.ladder.slow`), for comparison with the simulated count."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sweep.variables import Variable
 
 
 class Foreseen(Measurement):
-    """The engine predicts it; nothing is measured in the kernel."""
+    """Predict the count; nothing is measured in the kernel."""
 
     name = "foreseen"
     summary = "reversals by the slow equations, without the oscillations, and whether they are sure"

@@ -24,10 +24,8 @@ import numpy as np
 
 from sweep.jit import called
 from sweep.models.model import Model
+from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory.linear import NODES
-
-RATTLE = (0, 1, 2, 3, 5, 6)
-"""Indices of the states of the full model that vanish in upright spin."""
 
 # Phases of each mode; the equations are odd, so the second mode needs only half a turn.
 _PHASES = 8

@@ -15,18 +15,17 @@ from sweep.jit import called, inline
 # where T changes the rates by more than a share `_ACTS` of the frequency of the beat.
 _TURN, _BEAT, _ACTS = 0.02, 1.0, 0.02
 
-# Beyond this phase of the beat in a step, the modes keep to themselves as they change with the spin: what a step that
-# is long compared with the beat would excite of one by the other is nothing that the motion does.
+# If the beat advances by more than this phase in a step, each mode keeps its own amplitude while the modes change with
+# the spin. To resolve the old modes into the new ones would excite one by the other, which the motion does not do.
 _APART_STEP = 3.0
 
 # It is over when both modes decay and can change the spin by no more than this share.
 _OVER, _MOST_STEPS = 1e-3, 3000
 
-# Spins beyond this many times what the energy allows are of no motion.
+# The equations have failed if the spin exceeds what the energy allows by this factor.
 _FAR = 3.0
 
-# Where the modes meet they are taken to differ by this share of the matrix, and amplitudes may fall below what a number
-# can hold.
+# Eigenvalues differ by at least this share of the matrix; the squares of amplitudes may fall below the smallest number.
 _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
 

@@ -1,4 +1,4 @@
-"""Foresee counts: prepare the bodies, follow the slow equations, and ask what the count depends on."""
+"""Count reversals by the slow equations, and find out whether the counts depend on the terms that they leave out."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from sweep.jit import Cached, serial
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model, stack, take
-from sweep.models.slow.exchange import RATTLE, TERMS, make_exchange
+from sweep.models.slow.exchange import TERMS, make_exchange
 from sweep.models.slow.follow import follow
-from sweep.models.stiff.modes import SLIP_DECAY
+from sweep.models.stiff.modes import RATTLE, SLIP_DECAY
 from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear
 
@@ -32,7 +32,7 @@ _SMALL = 1e-8
 
 
 class Foreseen(NamedTuple):
-    """What the slow equations say of trajectories; arrays of shape (cells,)."""
+    """Counts by the slow equations; arrays of shape (cells,)."""
 
     reversals: Array
     """The number of reversals; 0 where there are no two rocking modes."""
