@@ -110,11 +110,9 @@ def _title(panels: Panels, name: str, panel: Panel, *, topmost: bool) -> str:
     """Name the variable of a column of maps, unless their bar does, and below it the values of the other axes."""
     words, compared = labels.words(panels.dataset, name), name in panels.compared
     if panels.compared:
-        words = (
-            words.rpartition(", ")[2]
-            if compared
-            else labels.short(name).partition(", ")[2] or quantities.source(panels.dataset)
-        )
+        origin = quantities.source(panels.dataset)
+        short = labels.short(name).partition(", ")[2].replace("simulated", origin) or origin
+        words = words.rpartition(", ")[2] if compared else short
     elif panel and not labels.flag_words(panels.dataset, name):
         words = ""
     if panels.compared and not topmost:
