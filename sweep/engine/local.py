@@ -98,5 +98,5 @@ def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     arrays = predict(config.tier, grid, config.measure).variables
     arrays["status"] = np.full(grid.size, SETTLED)
     if "reversals" in config.measure:
-        arrays["reversals"] = arrays.get("reversals_foreseen", arrays["reversals_predicted"])
+        arrays["reversals"] = arrays[config.tier.counts]
     return arrays

@@ -109,6 +109,8 @@ class Tier:
     """What it offers, a selection of the names above, such as `COUNT`."""
     positive: frozenset[str] = frozenset()
     """Parameters that must not be zero, although `sweep.parameters` allows it."""
+    counts: str = "reversals"
+    """The variable that its number of reversals is: for a tier that is not simulated, one of its predictions."""
 
 
 @dataclass(frozen=True, kw_only=True)

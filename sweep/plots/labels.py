@@ -38,6 +38,11 @@ def short(name: str) -> str:
     return _RECORDS[name].long_name if name in _RECORDS else name.replace("_", " ")
 
 
+def origin(dataset: xr.Dataset, name: str) -> str:
+    """Return what follows the quantity in the words for a variable: whether it is simulated, foreseen or predicted."""
+    return words(dataset, name).partition(", ")[2] or "simulated"
+
+
 def label(dataset: xr.Dataset, name: str) -> str:
     """The label of an axis: the quantity and its unit."""
     return with_unit(words(dataset, name), unit(dataset, name))
@@ -50,7 +55,7 @@ def with_unit(words: str, unit: str) -> str:
 
 def common(dataset: xr.Dataset, name: str) -> str:
     """The label of an axis or a bar that a variable shares with its prediction."""
-    alone = words(dataset, name.removesuffix("_predicted")).removesuffix(", simulated")
+    alone = re.sub(", (simulated|foreseen|predicted.*)$", "", words(dataset, name.removesuffix("_predicted")))
     return with_unit(alone, unit(dataset, name))
 
 

@@ -10,7 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.patches import Patch
 
 from sweep.parameters import PARAMETERS
-from sweep.plots import hatches, labels, lines, quantities
+from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.marks import legend, with_results
@@ -110,9 +110,7 @@ def _title(panels: Panels, name: str, panel: Panel, *, topmost: bool) -> str:
     """Name the variable of a column of maps, unless their bar does, and below it the values of the other axes."""
     words, compared = labels.words(panels.dataset, name), name in panels.compared
     if panels.compared:
-        origin = quantities.source(panels.dataset)
-        short = labels.short(name).partition(", ")[2].replace("simulated", origin) or origin
-        words = words.rpartition(", ")[2] if compared else short
+        words = words.rpartition(", ")[2] if compared else labels.origin(panels.dataset, name)
     elif panel and not labels.flag_words(panels.dataset, name):
         words = ""
     if panels.compared and not topmost:

@@ -27,15 +27,10 @@ class Derived:
     derive: Callable[[xr.Dataset], xr.DataArray]
 
 
-def source(dataset: xr.Dataset) -> str:
-    """Name the origin of `reversals`: the slow model has no simulation, and thus no time of its end."""
-    return "foreseen" if "reversals_foreseen" in dataset and "t_stop" not in dataset else "simulated"
-
-
 def _difference(dataset: xr.Dataset) -> xr.DataArray:
     simulated = dataset["reversals"]  # whose integers are too short for a difference
     found = (simulated.astype("int32") if simulated.dtype.kind == "i" else simulated) - dataset["reversals_predicted"]
-    return found.rename("difference").assign_attrs(long_name=f"{source(dataset)} − predicted")
+    return found.rename("difference").assign_attrs(long_name=f"{labels.origin(dataset, 'reversals')} − predicted")
 
 
 def _ratio(dataset: xr.Dataset) -> xr.DataArray:

@@ -140,9 +140,12 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
 
     The cells may lie along one dimension, in C order, or along the dimensions of the grid.
     """
+    meaning = {"reversals": VARIABLES[config.tier.counts]}
     variables = {
         name: xr.Variable(
-            (*over.dims, *filter(None, [spec.along])), shaped(over, spec, arrays[name]), described(spec, config.units)
+            (*over.dims, *filter(None, [spec.along])),
+            shaped(over, spec, arrays[name]),
+            described(meaning.get(name, spec), config.units),
         )
         for name, (over, spec) in layout(grid, arrays).items()
     }

@@ -104,9 +104,12 @@ def test_a_body_in_si_has_the_same_counts() -> None:
     np.testing.assert_array_equal(sweep.predict(asked).reversals_foreseen.values, paper.reversals_foreseen.values)
 
 
-def test_pictures_call_its_counts_foreseen() -> None:
-    """They are not simulated; a run that measures both has simulated ones as well."""
+def test_its_counts_are_called_foreseen() -> None:
+    """They are not simulated; a run that measures both has simulated ones as well, and a formula's are predicted."""
     alone = sweep.run(LINE | {"model": "slow"})
+    assert alone.reversals.attrs["long_name"] == alone.reversals_foreseen.attrs["long_name"]
+    formula = sweep.run(LINE | {"model": "analytic"})
+    assert formula.reversals.attrs["description"] == "Spin reversals predicted by Takano (2011), cases (I) and (II)."
     both = sweep.run({"friction": {"mu": [60, 80]}, "measure": ["reversals", "foreseen"]})
     assert quantities.field(alone, "difference").attrs["long_name"] == "foreseen − predicted"
     assert quantities.field(both, "difference").attrs["long_name"] == "simulated − predicted"

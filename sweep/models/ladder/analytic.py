@@ -59,4 +59,5 @@ MODEL = Tier(
     summary="the count by formula, without simulation (Takano 2011, nrk0, nrk1)",
     parameters=("a", "b", "c", "delta", "mu", "n0"),
     offers=frozenset({COUNT, FORMULAS}),
+    counts="reversals_predicted",
 )

@@ -16,4 +16,5 @@ MODEL = Tier(
     parameters=slip.MODEL.parameters,
     positive=frozenset({"mu"}),
     offers=frozenset({COUNT, FORMULAS}),
+    counts="reversals_foreseen",
 )
