@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis.internal.conjecture.providers import AVAILABLE_PROVIDERS, PrimitiveProvider
 from hypothesis.stateful import run_state_machine_as_test
 from machine import draws, oracles, words
+from machine.meetings import Meetings
 from machine.rules import Machine
 from support.kernels import SHARED
 
@@ -61,7 +62,7 @@ def run_machine(number: int, runs: int, kernels: int = 0, **parts: Any) -> int:
     """
     print(f"SWEEP_MACHINE_SEED={number}")
     pool = POOL.union(*islice(draws.further(Random(number)), kernels))
-    kind = type("TheMachine", (Machine,), {"pool": pool, "bases": draws.bases(pool), **parts})
+    kind = type("TheMachine", (Machine,), {"pool": pool, "bases": draws.bases(pool), "meetings": Meetings(), **parts})
     AVAILABLE_PROVIDERS["even"] = type("Seeded", (Even,), {"seed": number})
     how = settings(
         max_examples=runs, stateful_step_count=STEPS, deadline=None, database=None, backend="even", derandomize=False,
@@ -117,14 +118,22 @@ def test_each_verb_is_drawn() -> None:
 @pytest.mark.parametrize("verb", words.VERBS)
 def test_each_option_is_drawn(verb: str) -> None:
     """With some value that the command takes."""
-    left = set(words.options(verb))
-    for name in words.options(verb):
+    left = set(words.OPTIONS[verb])
+    for name in words.OPTIONS[verb]:
         for number in range(20):
             line = words.option(verb, name, number)
             context = words.VERBS[verb].make_context(verb, line, resilient_parsing=True)
             if context.params[name] not in (None, (), False):
                 left.discard(name)
     assert not left
+
+
+def test_features_that_have_met_least_are_taken() -> None:
+    """A rare one, though a draw with more features has more new pairs; and the same ones whenever they are offered."""
+    meetings, common = Meetings(), frozenset({"a", "b", "c"})
+    assert meetings.newest([1], [common]) == 1
+    offered = [common | {"d"}, frozenset({"a", "e"}), common]
+    assert [meetings.newest([1, 2, 3], offered) for _ in range(2)] == [2, 2]
 
 
 def test_oracles_see_what_is_wrong() -> None:

@@ -59,7 +59,8 @@ def nested(flat: Flat) -> dict[str, Any]:
     return found
 
 
-def _numbers(value: Any) -> list[float]:
+def numbers(value: Any) -> list[float]:
+    """The numbers in a value of a parameter: those of an axis, the ends of a range, what describes a distribution."""
     if isinstance(value, dict):
         return [value["start"], value["stop"]] if "start" in value else next(iter(value.values()))
     return value if isinstance(value, list) else [value]
@@ -73,9 +74,9 @@ def shipped() -> dict[str, Flat]:
         flat = flattened(YAML(typ="safe").load(file.read_text(encoding="utf-8")))
         if flat.get("model", "slip") in TIERS:
             flat |= {
-                path: _numbers(flat[path])[:2] for path in flat if path in PHYSICAL and isinstance(flat[path], list)
+                path: numbers(flat[path])[:2] for path in flat if path in PHYSICAL and isinstance(flat[path], list)
             }
-            flat |= {path: _numbers(flat[path]) for path in flat if path in PHYSICAL and "start" in str(flat[path])}
+            flat |= {path: numbers(flat[path]) for path in flat if path in PHYSICAL and "start" in str(flat[path])}
             found[file.stem] = flat | ({"samples": 3} if "samples" in flat else {})
     return found
 
@@ -83,8 +84,8 @@ def shipped() -> dict[str, Flat]:
 @cache
 def _known(path: str, units: str) -> list[float]:
     of_units = [flat for flat in shipped().values() if flat.get("units", PAPER_UNITS) == units]
-    numbers = [number for flat in of_units for number in _numbers(flat.get(path, []))]
-    return [number for number in numbers if isinstance(number, int | float)]
+    known = [number for flat in of_units for number in numbers(flat.get(path, []))]
+    return [number for number in known if isinstance(number, int | float)]
 
 
 def _physical(parameter: Parameter, random: Random, units: str) -> Any:
@@ -133,7 +134,7 @@ def _measure(random: Random) -> Any:
 def _cases(random: Random) -> Any:
     names = random.sample(["n0", "mu", "b", random.choice(sorted(PARAMETERS))], random.choice((1, 2)))
     return {
-        name: [v for _ in range(3) for v in _numbers(_physical(PARAMETERS[name], random, PAPER_UNITS))][:3]
+        name: [v for _ in range(3) for v in numbers(_physical(PARAMETERS[name], random, PAPER_UNITS))][:3]
         for name in names
     }
 
@@ -186,7 +187,7 @@ def accepted(flat: Flat, base: str = "paper") -> tuple[Flat, Config]:
                 if found := [path for path in paths if path in flat]:
                     del flat[found[0]]
                 elif fault.message.startswith("missing"):
-                    flat[paths[0]] = _numbers(setting(paths[0], i))[0]
+                    flat[paths[0]] = numbers(setting(paths[0], i))[0]
                 else:  # a section, or what a default says
                     flat = {path: value for path, value in flat.items() if path.split(".")[0] != fault.path[0]}
     return shipped()[base], load_config(nested(shipped()[base]))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import subprocess
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,7 @@ from support.runs import Stop, same_numbers
 import sweep
 from machine import draws, oracles, words
 from machine.draws import Draws, Flat, Piece
+from machine.meetings import Features, Meetings, features
 from sweep.cli import main
 from sweep.config import Config, ConfigError, load_config
 from sweep.config.document import parse_value
@@ -44,13 +46,30 @@ from sweep.results.summary import contents, describe
 from sweep.units import PAPER_UNITS
 
 NUMBER = st.integers(0, 999)
+
+
+def several(drawn: st.SearchStrategy[Any], number: int = 3) -> st.SearchStrategy[list[Any]]:
+    """Draws of which the machine takes one."""
+    return st.lists(drawn, min_size=number, max_size=number)
+
+
+def asked_of(names: Iterable[str], known: Mapping[str, list[str]], most: int = 3) -> st.SearchStrategy[Asked]:
+    """A command or a function, with some of its options or arguments."""
+    return st.sampled_from(sorted(names)).flatmap(lambda name: st.tuples(st.just(name), draws.draws(known[name], most)))
+
+
 CHANGES = st.tuples(draws.draws(draws.PHYSICAL, 5, 2), draws.draws(draws.OTHERWISE, 5, 2)).map(
     lambda two: two[0] + two[1]
 )
+SCENES = several(st.tuples(NUMBER, CHANGES), 4)
 PICTURE = draws.draws(words.TAKEN["plot"], 4)
 REPEATED = ["integrator.t_end", "integrator.tolerance"]
 NUMBERS = ("status", "reversals", "t_stop", "spin_final", "t_last_reversal", "margin", "decided")
 STUDIES = ("boundaries", "critical", "indices")
+NUMERALS = re.compile(r"-?\d+(\.\d*)?(e-?\d+)?")
+
+Asked = tuple[str, Draws]
+"""A command or a function, and options or arguments of it."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +78,11 @@ class Scene:
 
     flat: Flat
     config: Config
+
+    @property
+    def features(self) -> Features:
+        """What tells it from others."""
+        return features(draws.shipped()["paper"], self.flat) | {self.config.tier.name, f"{len(self.config.axes)} axes"}
 
     def with_(self, changes: Flat, *without: str) -> dict[str, Any]:
         """What its file would say with some keys changed, and others left out."""
@@ -92,6 +116,7 @@ class Machine(RuleBasedStateMachine):
     """Whether documents of the explorer are built."""
     done: ClassVar[int] = 0
     """Combinations so far."""
+    meetings: ClassVar[Meetings] = Meetings()
 
     def __init__(self) -> None:
         super().__init__()
@@ -120,6 +145,11 @@ class Machine(RuleBasedStateMachine):
             event(f"refused: {what}")
             return None
 
+    def _newest(self, offered: list[tuple[str, Any]]) -> Any:
+        """What the configuration has met least: a command or a function, and its words, whose numbers do not count."""
+        words = [{f"{verb} {NUMERALS.sub('0', word)}" for word in ("", *given)} for verb, given in offered]
+        return self.meetings.newest(offered, [self.scene.features | each for each in words])
+
     def _new(self, name: str = "") -> Path:
         return Path(os.path.join(self.folder, f"{len(os.listdir(self.folder))}{name}"))
 
@@ -136,10 +166,11 @@ class Machine(RuleBasedStateMachine):
 
     # ---- configurations and their runs
 
-    @initialize(base=NUMBER, changes=CHANGES, arguments=PICTURE, at=NUMBER)
-    def begin(self, base: int, changes: Draws, arguments: Draws, at: int) -> None:
+    @initialize(drawn=SCENES, arguments=PICTURE, at=NUMBER)
+    def begin(self, drawn: list[tuple[int, Draws]], arguments: Draws, at: int) -> None:
         """Draw a configuration and run it; and what costs little is asked of each."""
-        self.scene = Scene(*draws.scene(self.bases[base % len(self.bases)], changes, self.pool))
+        scenes = [Scene(*draws.scene(self.bases[n % len(self.bases)], changes, self.pool)) for n, changes in drawn]
+        self.scene = self.meetings.newest(scenes, [each.features for each in scenes])
         self.config = self.scene.config
         varies = {*self.config.axes, *self.config.cases}
         self.varying = [name for name in self.config.tier.parameters if name in varies]
@@ -185,13 +216,11 @@ class Machine(RuleBasedStateMachine):
         cells = list(dict.fromkeys(int(ran[n % len(ran)]) for n in places))
         columns = {name: self.rows[name][cells].tolist() for name in self.varying or config.tier.parameters[:1]}
         keys = {config.table[name].path: column[0] for name, column in columns.items()}
-        several = [path for path in self.scene.flat if path in draws.PHYSICAL and path not in keys]
-        several = [path for path in several if isinstance(self.scene.flat[path], list | dict)]  # of other models
+        given = {path: value for path, value in self.scene.flat.items() if path in draws.PHYSICAL and path not in keys}
         settings = {f"integrator.{key}": value for key, value in config.integrator.model_dump().items()}
+        settings |= {path: draws.numbers(value)[0] for path, value in given.items()}  # several are of other models
         alone = keys if len(cells) == 1 and number % 2 else {"cases": columns}
-        again = oracles.rows(
-            self._run(self.scene.with_(settings | alone, *keys, *several, "samples", "cases", "refine"))
-        )
+        again = oracles.rows(self._run(self.scene.with_(settings | alone, *keys, "samples", "cases", "refine")))
         there = {name: self.rows[name][cells] for name in self.rows if name in self.found.data_vars}
         assert there.keys() - again.keys() <= {"inferred"}
         oracles.same(again, there)
@@ -282,16 +311,18 @@ class Machine(RuleBasedStateMachine):
     @rule(given=draws.draws(range(20), 6, 1), number=NUMBER)
     def overridden(self, given: Draws, number: int) -> None:
         """What a file, the command line and Python each say a part of is run as if it stood in one file."""
-        kept = {"cases", *(self.config.table[name].path for name in self.config.distributions)}  # which are in an order
-        paths = sorted({[*self.scene.flat][k % len(self.scene.flat)] for k, _ in given} - kept)
+        paths = sorted({[*self.scene.flat][k % len(self.scene.flat)] for k, _ in given} - {"cases"})
         file, folder = self._written(json.dumps(self.scene.with_({}, *paths))), self._new()
-        settings = [f"--set={path}={json.dumps(self.scene.flat[path])}" for path in paths]
+        config = load_config(file, {path: self.scene.flat[path] for path in paths})
+        if [*config.distributions] != [*self.config.distributions]:  # samples depend on the order of their parameters
+            return
         if number % 2:
+            settings = [f"--set={path}={json.dumps(self.scene.flat[path])}" for path in paths]
             with nothing_drawn():
                 invoke("run", str(file), *settings, f"--output={folder}", "--quiet")
             found = sweep.open(next(folder.glob("*.nc")))
         else:
-            found = self._run(load_config(file, {path: self.scene.flat[path] for path in paths}))
+            found = self._run(config)
         self._compare(found)
 
     @precondition(lambda self: self.client is not None)
@@ -350,10 +381,11 @@ class Machine(RuleBasedStateMachine):
             for cells, rows in ((repeated, fresh), (~repeated, old)):
                 oracles.same({k: v[cells] for k, v in new.items()}, {k: v[cells] for k, v in rows.items()}, NUMBERS)
 
-    @rule(verb=st.sampled_from(["run", "run", *STUDIES]), chunks=st.integers(0, 3), given=st.data())
-    def interrupted(self, verb: str, chunks: int, given: Any) -> None:
+    @rule(drawn=several(asked_of(["run", "run", *STUDIES], words.TAKEN, 2)), chunks=st.integers(0, 3))
+    def interrupted(self, drawn: list[Asked], chunks: int) -> None:
         """What was interrupted goes on to the same numbers, which are in the file that is written."""
-        taken = words.arguments(verb, given.draw(draws.draws(words.TAKEN[verb], 2))) if verb != "run" else {}
+        offered = [(verb, words.arguments(verb, given) if verb != "run" else {}) for verb, given in drawn]
+        verb, taken = self._newest(offered)
         taken = {"bracket": 0.2} | taken if verb in ("boundaries", "critical") else taken
         taken.pop("fresh", None)
         call, folder = getattr(sweep, verb), self._new()
@@ -478,10 +510,10 @@ class Machine(RuleBasedStateMachine):
             View(document, source, usable(source), None, query)
             document.validate()
 
-    @rule(name=st.sampled_from(words.CALLED), given=st.data())
-    def call(self, name: str, given: Any) -> None:
+    @rule(drawn=several(asked_of(words.CALLED, words.TAKEN)))
+    def call(self, drawn: list[Asked]) -> None:
         """A function that takes a configuration, with any of its arguments."""
-        taken = words.arguments(name, given.draw(draws.draws(words.TAKEN[name], 3)))
+        name, taken = self._newest([(name, words.arguments(name, given)) for name, given in drawn])
         if name in words.SLOW and not self.far:
             return
         taken |= {"film": self._film(), "free": ["mu"]} if name == "fit" else {}
@@ -502,12 +534,13 @@ class Machine(RuleBasedStateMachine):
 
     # ---- the command line
 
-    @rule(which=NUMBER, verb=st.sampled_from(sorted(words.VERBS)), given=st.data())
-    def command(self, which: int, verb: str, given: Any) -> None:
+    @rule(which=NUMBER, drawn=several(asked_of(words.VERBS, words.OPTIONS)))
+    def command(self, which: int, drawn: list[Asked]) -> None:
         """A command with any of its options."""
+        offered = [(verb, [w for name, n in given for w in words.option(verb, name, n)]) for verb, given in drawn]
+        verb, line = self._newest(offered)
         asked = words.VERBS[verb].params
-        known, drawn = {each.name for each in asked}, given.draw(draws.draws(words.options(verb), 3))
-        line = [word for name, n in drawn for word in words.option(verb, name, n)]
+        known = {each.name for each in asked}
         if "config" in known and not self._carried_out(line):
             line.append("--dry-run")
         if (verb in words.SLOW and not self.far) or ("--dry-run" in line and "dry_run" not in known):

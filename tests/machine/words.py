@@ -54,10 +54,13 @@ _TYPES: dict[str, tuple[Any, ...]] = {"bool": (True, False), "float": (0.0, 5.0,
 """Those of any other argument, by the first word of its type."""
 
 
-def options(verb: str) -> list[str]:
-    """The options of a command that are drawn: files and addresses are the machine's."""
-    mine = [each for each in VERBS[verb].params if isinstance(each, click.Option) and each.name != "scheduler"]
+def _options(command: click.Command) -> list[str]:
+    mine = [each for each in command.params if isinstance(each, click.Option) and each.name != "scheduler"]
     return [str(each.name) for each in mine if not isinstance(each.type, click.Path)]
+
+
+OPTIONS = {verb: _options(command) for verb, command in VERBS.items()}
+"""The options of each command that are drawn: files and addresses are the machine's."""
 
 
 def option(verb: str, name: str, number: int) -> list[str]:
