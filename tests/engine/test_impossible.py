@@ -168,3 +168,9 @@ def test_a_fixed_step_is_judged_by_the_bodies_that_there_are(write: Write) -> No
     assert load_config(write(text)).integrator.step == 0.8
     with pytest.raises(ConfigError, match="a quarter of the rattle's period"):
         load_config(write(text), {"Izz": 20.0})
+
+
+def test_an_inertia_without_an_inverse_is_impossible() -> None:
+    body = {"a": 10, "b": 3, "Ixx": 0.3, "Iyy": 0.3, "Izz": 0.03, "Ixy": [-0.3, 0.011]}
+    found = sweep.run({"body": body | {"c": [1.1, 0.5]}, "friction": {"mu": 20}, "integrator": {"t_end": 50}})
+    np.testing.assert_array_equal((found["status"] == IMPOSSIBLE).transpose("Ixy", "c"), [[True, True], [False, False]])
