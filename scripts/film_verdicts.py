@@ -51,8 +51,8 @@ radians; a film at 240 images a second is taken for one at 60; a tenth of the ro
 film begins late; the drag is held at zero."""
 
 
-MOST_EVALUATIONS = 2_000_000
-"""Of the equations for one film: a film takes up to 50,000, and one whose body slides as LSODA cannot follow, hours."""
+MOST_EVALUATIONS = 200_000
+"""Of the equations for one film: a film takes up to 30,000; of some that slide LSODA takes hours."""
 
 _OFF = 1 / 3
 """Root mean square between a fitted curve and that of the film without noise, in its noise: beyond, it is wrong."""

@@ -49,7 +49,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     """
     found = formulas(tier, grid)
     if tier is slow.MODEL and Reversals.name in measure:
-        found |= _foreseen(slip.MODEL, grid.columns())
+        found |= foreseen(slip.MODEL, grid.columns())
     if not isinstance(tier, Model):
         return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
     bodies, place = grid.bodies()
@@ -60,7 +60,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     if REVERSAL_TIME in tier.offers and FirstReversal.name in measure:
         found |= _reversal_time(tier, grid.columns(), n_c1[:, place])
     if Foreseen.name in measure:
-        found |= _foreseen(tier, grid.columns())
+        found |= foreseen(tier, grid.columns())
     return Prediction(found, n_c1, ranges[:, place])
 
 
@@ -76,11 +76,11 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
     return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}
 
 
-def _foreseen(model: Model, columns: Columns) -> dict[str, Array]:
-    """Return the counts by the slow equations, computed on all threads."""
+def foreseen(model: Model, columns: Columns, *, check: bool = True) -> dict[str, Array]:
+    """Return the counts by the slow equations, computed on all threads; `check` as for `foresee`."""
     size = len(next(iter(columns.values())))
     parts = [slice(begin, begin + _SOME) for begin in range(0, size, _SOME)]
-    found = on_all_threads(lambda some: foresee(model, {k: v[some] for k, v in columns.items()}), parts)
+    found = on_all_threads(lambda some: foresee(model, {k: v[some] for k, v in columns.items()}, check=check), parts)
     return dict(zip(Foreseen.variables, map(np.concatenate, zip(*found, strict=True)), strict=True))
 
 

@@ -8,10 +8,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from bokeh.models import CustomJSTickFormatter, Row, Select, Slider, TextInput
+from bokeh.models import Button, CustomJSTickFormatter, Row, Select, Slider, TextInput
 
 from sweep.explorer.slices import Source
-from sweep.explorer.state import LIMITS, Choice, State, choices, limit
+from sweep.explorer.state import LIMITS, Cell, Choice, State, choices, limit
+from sweep.parameters import PARAMETERS
+from sweep.plots import labels
 
 WIDGETS = ":host { color: #1b2733; color-scheme: light; filter: var(--widgets) }"
 """Style of the outermost widgets, which a dark page inverts."""
@@ -77,3 +79,54 @@ class MapControls:
 
         on(field, "value", lambda text: self._change(partial(put, at=limit(text))))
         return field
+
+
+class BodyControls:
+    """Sliders for parameters that are constant in the dataset, from a quarter of their values to four times."""
+
+    _SPAN = 4.0
+
+    def __init__(self, source: Source, values: Cell, change: Callable[[Callable[[State], State]], None]) -> None:
+        self._values, self._change, self._quiet = values, change, False
+        self._sliders = {name: self._slider(source, name, value) for name, value in values.items()}
+        self._back = Button(label="Back to the dataset", name="back", width=150, visible=False)
+        self._back.on_click(lambda: change(lambda state: replace(state, changed={})))
+        self.root = Row(*self._sliders.values(), self._back, name="body", visible=bool(values), stylesheets=[WIDGETS],
+                        sizing_mode="stretch_width",
+                        styles={"gap": "6px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
+
+    def show(self, state: State) -> None:
+        """Set the sliders to the values whose counts are shown."""
+        self._quiet = True
+        for name, slider in self._sliders.items():
+            wanted = state.changed.get(name, self._values[name])
+            if wanted != self._at(name, slider.value):  # rounding would move the slider under the hand
+                ratio = wanted / self._values[name]
+                slider.value = math.log(ratio, self._SPAN) if ratio > 0 else 0.0
+        self._back.visible = bool(state.changed)
+        self._quiet = False
+
+    def _slider(self, source: Source, name: str, value: float) -> Slider:
+        code = "return sweep.number(Number((value * span ** tick).toPrecision(3)))"
+        words = CustomJSTickFormatter(args={"value": value, "span": self._SPAN}, code=code)
+        title = labels.with_unit(labels.symbol(name), labels.si_unit(source.dataset, name).strip())
+        slider = Slider(start=-1, end=1, step=0.01, value=0, width=150, title=title, format=words,
+                        name=f"body {name}", stylesheets=[BARE])  # fmt: skip
+        on(slider, "value", partial(self._moved, name))
+        return slider
+
+    def _at(self, name: str, place: float) -> float:
+        """The value at a place of a slider, to three digits; the dataset's is at zero."""
+        value = self._values[name] * self._SPAN ** min(max(place, -1.0), 1.0)
+        return float(f"{value:.3g}") if place else self._values[name]
+
+    def _moved(self, name: str, place: float) -> None:
+        value = self._at(name, place)
+        if self._quiet or not PARAMETERS[name].allows(value):
+            return
+        changed = {name: value} if place else {}
+        self._change(lambda state: replace(state, changed=_without(state.changed, name) | changed))
+
+
+def _without(cell: Cell, name: str) -> dict[str, float]:
+    return {key: value for key, value in cell.items() if key != name}

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from bokeh import models
 from bokeh.models import ColumnDataSource
 from bokeh.plotting import figure
@@ -20,7 +21,7 @@ from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import State
 from sweep.explorer.style import SOFT, TILES
 from sweep.plots import labels, marks, places, theory
-from sweep.plots.description import Map
+from sweep.plots.description import Map, describe
 from sweep.plots.scales import Scale
 
 HEIGHT = 480
@@ -83,9 +84,12 @@ class MapFigure:
                  "cells": self._cells, "cuts": self._cuts,
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
-    def show(self, state: State) -> tuple[Map, Scale]:
-        """Show the variable of a state; returns its map and its colour scale."""
-        part = self._source.map(state.show, *self.axes, state.at)
+    def show(self, state: State, other: xr.Dataset | None = None) -> tuple[Map, Scale]:
+        """Show the variable of a state, or the first one of `other` over its axes; returns map and colour scale."""
+        if other is None:
+            part, known = self._source.map(state.show, *self.axes, state.at), self._source.cell
+        else:
+            part, known = describe(other, next(iter(map(str, other.data_vars))), *self.axes), other
         scale = style.scale_of(part, state)
         logarithmic = style.is_logarithmic(scale)
         for image in self._images:
@@ -112,24 +116,25 @@ class MapFigure:
             words = (scale.ticks or {}) if part.flags else {}
             ticker = models.FixedTicker(ticks=list(words), minor_ticks=[]) if words else models.BasicTicker()
             cut["plot"].yaxis.update(ticker=ticker, major_label_overrides=words)
-        self.figure.title.text = self._source.label(part.name)
+        unit = labels.unit(known, part.name) if part.name in known else ""
+        self.figure.title.text = labels.with_unit(labels.words(known, part.name), unit)
         # A new bar, because an old one omits ticks beyond its first scale.
-        self.figure.right = [self._bar(part, scale, mapper)]
+        self.figure.right = [_bar(unit, scale, mapper)]
         flags = {str(k): words for k, words in part.flags.items()}
         code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
         self._hover.tooltips = [(self._source.words(part.name), "@image{custom}")]
         self._hover.formatters = {"@image": models.CustomJSHover(args={"words": flags}, code=code)}
         return part, scale
 
-    def _bar(self, part: Map, scale: Scale, mapper: Any) -> models.ColorBar:
-        chosen_by_bokeh: Any = "auto" if style.is_logarithmic(scale) else models.BasicTicker()
-        ticks = scale.ticks or {}
-        return models.ColorBar(
-            color_mapper=mapper,
-            ticker=models.FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
-            title=labels.unit(self._source.cell, part.name) or None, formatter=style.numbers(),
-            major_label_overrides=ticks, **_BAR,
-        )  # fmt: skip
+
+def _bar(unit: str, scale: Scale, mapper: Any) -> models.ColorBar:
+    chosen_by_bokeh: Any = "auto" if style.is_logarithmic(scale) else models.BasicTicker()
+    ticks = scale.ticks or {}
+    return models.ColorBar(
+        color_mapper=mapper,
+        ticker=models.FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
+        title=unit or None, formatter=style.numbers(), major_label_overrides=ticks, **_BAR,
+    )  # fmt: skip
 
 
 def _line(plot: Any, dash: str, width: float) -> ColumnDataSource:

@@ -1,4 +1,4 @@
-"""Run the trajectories of the drawn cells in a separate thread, while the page stays responsive."""
+"""Run what a page waits for in a separate thread, while it stays responsive: trajectories, and counts of bodies."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
 from queue import PriorityQueue
+from typing import Any
 
 import xarray as xr
 
@@ -64,7 +65,10 @@ class Dropped(Exception):
 
 @dataclass(eq=False)
 class Job(Reporter):
-    """A trajectory that a page waits for; `report` is called with the job, on the runner's thread, when it changes."""
+    """A trajectory that a page waits for; `report` is called with the job, on the runner's thread, when it changes.
+
+    A subclass with another `begin` may be anything else that has a beginning and a `whole`.
+    """
 
     cell: Cell
     report: Callable[[Job], None]
@@ -72,8 +76,8 @@ class Job(Reporter):
     """Share of the time that has been simulated."""
     delay: str = ""
     """Why the job waits; empty if it runs."""
-    curve: Curve | None = None
-    """The curve so far; at first the curve of the job that this one replaces."""
+    curve: Any = None
+    """The `Curve` so far; at first that of the job that this one replaces."""
     fault: str = ""
     """Why there will be no curve; empty if there will be one."""
     over: bool = False
@@ -82,9 +86,13 @@ class Job(Reporter):
     """Set when the job is no longer needed: the run ends at its next chunk, and `report` is not called again."""
     t_end: float = 1.0
     """The time at which the run ends."""
-    rest: Iterator[Curve] = field(default_factory=lambda: iter(()))
+    rest: Iterator[Any] = field(default_factory=lambda: iter(()))
     """Continues the run."""
     _reported: float = 0.0
+
+    def begin(self, setup: Setup) -> Iterator[Any]:
+        """Yield what is found, ever more of it; the last is `whole`."""
+        return run(setup, self.cell, self)
 
     def news(self, delay: str = "") -> None:
         """Report a change, unless the job is no longer needed."""
@@ -142,7 +150,7 @@ class Runner:
 
     def submit(self, job: Job) -> None:
         """Run a trajectory, after those submitted earlier have advanced as far."""
-        job.rest = run(self._setup, job.cell, job)
+        job.rest = job.begin(self._setup)
         self._jobs.put((0.0, next(self._numbers), job))
         if self._compiles:
             job.news(COMPILING)

@@ -56,6 +56,8 @@ class State:
     palette: str = ""
     limits: Mapping[str, float] = field(default_factory=dict)
     """Ends of the colour scale that the visitor has chosen; the values determine the others."""
+    changed: Cell = field(default_factory=dict)
+    """Parameters with other values than in the dataset, for which counts are foreseen."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,16 @@ def write(state: State, source: Source, base: Cell) -> str:
     chosen = {name: c.options[c.of(state)] for name, c in choices(source).items() if name not in (state.x, state.y)}
     pairs = [(name, option) for name, option in chosen.items() if option]
     pairs += [(name, f"{state.limits[name]:.12g}") for name in LIMITS if name in state.limits]
+    if state.changed:
+        pairs.append(("with", _named_values(state.changed)))
     for cell in state.cells:
         named = {n: v for n, v in cell.items() if n in source.dims or v != base.get(n)}
-        pairs.append(("cell", ",".join(f"{n}:{v:.12g}" for n, v in named.items())))
+        pairs.append(("cell", _named_values(named)))
     return urlencode(pairs, safe=":,")
+
+
+def _named_values(cell: Cell) -> str:
+    return ",".join(f"{name}:{value:.12g}" for name, value in cell.items())
 
 
 def read(
@@ -159,15 +167,21 @@ def read(
             state = replace(state, limits={**state.limits, key: at})
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])}: give a number from {-LARGEST:g} to {LARGEST:g}")
-        elif key not in ("cell", *_ENDED):
+        elif key not in ("cell", "with", *_ENDED):
             unknown.append(f"'{brief(key)}'")
     if unknown:
-        expected = ", ".join([*all_choices, *LIMITS, "cell"])
+        expected = ", ".join([*all_choices, *LIMITS, "with", "cell"])
         those, more = ", ".join(unknown[:_NAMED]), " …" if len(unknown) > _NAMED else ""
         faults.append(f"unknown URL parameter {those}{more}; expected one of {expected}")
     if len(state.limits) == len(LIMITS) and not state.limits["low"] < state.limits["high"]:
         faults.append("low is not below high; the values set the ends of the colours")
         state = replace(state, limits={})
+    for text in query.get("with", ())[-1:]:
+        try:
+            cell = _cell(text, base, known)
+            state = replace(state, changed={n: v for n, v in cell.items() if n not in source.dims and v != base[n]})
+        except ValueError as fault:
+            faults.append(f"with={brief(text)}: {fault}")
     asked, cells = query.get("cell", ()), list[Cell]()
     for text in asked[:MAX_CELLS]:
         try:

@@ -10,7 +10,7 @@ from typing import Any
 from bokeh.document import Document
 from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 
-from sweep.explorer import controls, export, figure, page
+from sweep.explorer import bodies, controls, export, figure, page
 from sweep.explorer import state as states
 from sweep.explorer.chosen import CellControls
 from sweep.explorer.curves import Curves
@@ -31,6 +31,10 @@ class View:
     _shown: figure.MapFigure
     _curves: Sequence[Curve | None] = ()
     """The curves on the page."""
+    _other: bodies.Body | None = None
+    """The search for counts of a body that the dataset does not have, if the page shows one."""
+    _counts: bodies.Counts | None = None
+    """Its counts that are on the page."""
 
     def __init__(
         self, document: Document, source: Source, setup: Setup | None, runner: Runner | None,
@@ -41,11 +45,13 @@ class View:
         self._known = setup.config.table if setup else {}
         self.state, self._faults = states.read(query, source, self._base, self._known)
         self._build()
+        self._runner = runner
         self._drawn = Drawn(self.state.cells, runner, self._report)
+        self._count_others()
         self._draw_map()
         self._draw_cells()
         page.dress(document, source, self._query())
-        document.on_session_destroyed(lambda _: self._drawn.leave())
+        document.on_session_destroyed(lambda _: self._leave())
 
     # ---- parts of the page
 
@@ -58,10 +64,11 @@ class View:
         self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
         self._figures = Curves(str(PARTS.empty()))
         self._controls = controls.MapControls(self._source, self._change)
+        self._body = controls.BodyControls(self._source, bodies.can_change(self._setup, self._source), self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
         self._document.js_on_event("document_ready", self._figures.player.moment)
-        for root in (self._controls.root, self._notice, self._map, self._legend, self._cell, self._figures.root,
-                     self._figures.player.root, self._chosen.root, self._buttons()):  # fmt: skip
+        for root in (self._controls.root, self._notice, self._map, self._legend, self._body.root, self._cell,
+                     self._figures.root, self._figures.player.root, self._chosen.root, self._buttons()):  # fmt: skip
             self._document.add_root(root)
 
     def _call(self, name: str, *given: Any) -> None:
@@ -75,8 +82,26 @@ class View:
         if (state := change(self.state)) != self.state:
             self.state = state
             self._faults = []
-            self._draw_map()
+            stays = self._count_others() and self._shown.axes == (state.x, state.y)
+            if not stays:
+                self._draw_map()
             self._draw_cells()
+
+    def _count_others(self) -> bool:
+        """Count for the body of the state if it is another one; return whether counts are about to come."""
+        old, state = self._other, self.state
+        if old and old.counts_for(state):
+            return False
+        self._leave_other()
+        if state.changed and self._runner and {state.x, state.y} - {""} <= self._base.keys():
+            last = old.curve if old and self._shown.axes == (state.x, state.y) else None
+            self._other = bodies.Body(state.changed, self._report, curve=last, source=self._source, state=state)
+            self._runner.submit(self._other)
+        return self._other is not None
+
+    def _leave_other(self) -> None:
+        if self._other:
+            self._other.dropped, self._other = True, None
 
     def _draw_map(self) -> None:
         if not self._map.children or self._shown.axes != (self.state.x, self.state.y):
@@ -84,8 +109,10 @@ class View:
             self._map.children = [self._shown.figure, self._shown.cuts]
             controls.on(self._shown.probe, "data", lambda _: self._point())
             controls.on(self._shown.request, "data", lambda _: self._requested())
-        self._legend.text = page.legend(*self._shown.show(self.state))
+        self._counts = counts = self._other.curve if self._other else None
+        self._legend.text = page.legend(*self._shown.show(self.state, counts.dataset if counts else None))
         self._controls.show(self.state)
+        self._body.show(self.state)
 
     def _place(self, source: ColumnDataSource) -> dict[str, int] | None:
         """The index on every axis of the cell that the browser wrote into `source`; None if it wrote no cell."""
@@ -104,6 +131,10 @@ class View:
             return
         dataset, axes = self._source.dataset, self._source.axes
         here = [labels.measured(dataset, d, axes[d].values[index[d]]) for d in self._source.dims]
+        if self._other and self._other.curve:
+            here.append(bodies.changes(self._source, self.state.changed))
+            self._cell.text = str(PARTS.cell(", ".join(here), "", self._other.curve.values_at(index), {}))
+            return
         values = self._source.values_at(index)
         self._cell.text = str(PARTS.cell(", ".join(here), values.pop("note", ""), values, self._source.meanings))
 
@@ -114,7 +145,7 @@ class View:
         index = self._place(self._shown.request)
         if index is None or not self._setup:
             return
-        cell = {**self._base, **self._source.parameters_at(tuple(self._base), index)}
+        cell = {**self._base, **self._source.parameters_at(tuple(self._base), index), **self.state.changed}
         if cell in self._drawn.cells:
             self._activate(self._drawn.cells.index(cell))
             return
@@ -150,6 +181,8 @@ class View:
     def _update(self, job: Job) -> None:
         if not job.dropped:
             self._faults = [job.fault] if job.fault else self._faults
+            if job is self._other and job.curve is not self._counts:
+                self._draw_map()
             if self._drawn.curves != self._curves:
                 self._draw_curves()
             self._draw_progress()
@@ -193,9 +226,15 @@ class View:
 
     def _draw_progress(self) -> None:
         names = self._names()
-        running = [(f"{names[k]}: {job.delay or f'{job.share:.0%}'}", job.share) for k, job in self._drawn.running()]
+        jobs = [(names[k], job) for k, job in self._drawn.running()]
+        jobs += [("counts", self._other)] if self._other and not self._other.over else []
+        running = [(f"{name}: {job.delay or f'{job.share:.0%}'}", job.share) for name, job in jobs]
         self._notice.text = str(PARTS.notice(self._faults, running))
         self._notice.visible = bool(self._faults or running)
+
+    def _leave(self) -> None:
+        self._leave_other()
+        self._drawn.leave()
 
     # ---- files
 

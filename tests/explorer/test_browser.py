@@ -355,6 +355,31 @@ def test_axes_variable_and_selection_change(go: Open, served: str, opened: xr.Da
     assert image(page) == difference.ravel().tolist()
 
 
+def test_another_body_is_foreseen_and_then_simulated(visit: Open, counts: np.ndarray) -> None:
+    """Its counts follow a slider; a click runs its trajectory; and the dataset's map returns."""
+    page = visit("n0=0.05")
+    before = image(page)
+    control(page, "body delta", "[role=slider]").focus()
+    for _ in range(30):
+        page.keyboard.press("ArrowRight")
+    wait(page, "map figure", "/^spin reversals, simulated, δ = 0.045.* rad$/.test(m.title.text)")
+    assert page.url.endswith("&n0=0.05&with=delta:0.0455")
+    body, friction = {"b": [2, 3, 4, 5], "delta": 0.0455}, {"mu": [40, 50, 60, 70, 80]}
+    other = sweep.run(
+        {"body": body, "friction": friction, "measure": ["reversals"]}, t_end=1500, method="dopri5", n0=0.05
+    )
+    assert image(page) == other["reversals"].transpose("b", "mu").values.ravel().tolist()
+    page.mouse.move(*place(page, 3, 2))
+    page.locator("#cell").get_by_text("μ = 70, b = 4, n₀ = 0.05, δ = 0.0455 rad").wait_for()
+    page.mouse.click(*place(page, 3, 2))
+    page.wait_for_url(re.compile(r"cell=b:4,delta:0.0455,mu:70,n0:0.05"))
+    control(page, "back", "button").click()
+    wait(page, "map figure", "m.title.text === 'spin reversals, simulated'")
+    assert image(page) == before == counts.ravel().tolist()
+    assert "with=" not in page.url
+    page.close()
+
+
 def document_of(dataset: xr.Dataset, **query: str) -> Any:
     """The document that the server makes of an address, without a browser."""
     from bokeh.document import Document

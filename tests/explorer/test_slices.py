@@ -85,6 +85,6 @@ def test_what_has_no_map_is_refused(dims: tuple[str, ...]) -> None:
 
 
 def test_no_axis_has_the_name_of_a_key_of_the_address(opened: xr.Dataset) -> None:
-    assert {field.name for field in fields(state.State)} - {"cells", "at", "limits"} < slices.ADDRESS
+    assert {field.name for field in fields(state.State)} - {"cells", "at", "limits", "changed"} < slices.ADDRESS
     with pytest.raises(StoreError, match="the axis show has the name"):
         Source(opened.rename(mu="show"))

@@ -90,6 +90,16 @@ def test_bodies_without_two_rocking_modes_are_not_sure() -> None:
     assert (found.reversals[:2] == 0).all()
 
 
+def test_a_start_by_angles_and_rates_is_foreseen() -> None:
+    """The same motion as by n0, x0 and y0 where the body spins about the vertical; and another one that is pushed."""
+    start = {"roll": 0.01, "pitch": 0.002, "omega3": [-0.05, 0.05], "omega1": [0.0, 0.01]}
+    found = sweep.run(LINE | {"start": start, "measure": ["reversals", "margin", "foreseen"]})
+    right, decided = (found.reversals == found.reversals_foreseen).values, found.decided.values == 1
+    assert right[decided].mean() > 0.8
+    assert found.foreseen_sure.values.any()
+    assert right[decided & (found.foreseen_sure.values == 1)].all()
+
+
 def test_a_body_in_si_has_the_same_counts() -> None:
     """Given by lengths and times, with gravity, where the equations are those of another variant."""
     paper = sweep.run(LINE | {"model": "slow"})

@@ -1,0 +1,153 @@
+"""Maps of counts for bodies that the dataset does not have: foreseen at once, and simulated behind that."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from sweep.config import Config, Values
+from sweep.engine.run import run
+from sweep.explorer.runner import Job
+from sweep.explorer.setup import Setup
+from sweep.explorer.slices import Source
+from sweep.explorer.state import Cell, State
+from sweep.grid import Array
+from sweep.kernels import measures
+from sweep.kernels.status import IMPOSSIBLE, SETTLED
+from sweep.models.model import MODES
+from sweep.plots import labels
+from sweep.prediction import foreseen
+
+COUNT = "reversals_foreseen"
+"""The variable of the maps, until it is simulated everywhere."""
+
+_MOST = 64
+"""Most values along an axis: of a longer one every second, third, … stands for those beside it."""
+
+_COARSE, _SPREADS = 4, (4, 2, 1)
+"""The first map has every fourth value along each axis; simulated cells fill a map in this order."""
+
+_REST = 0.5
+"""Seconds for which the sliders have to rest before a body is simulated, because its runs hold up the page."""
+
+_TOGETHER = 256
+"""Cells that are simulated together; between them the page's trajectories go on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """A map of counts, of which a `share` is simulated."""
+
+    dataset: xr.Dataset
+    share: float
+
+    @property
+    def whole(self) -> bool:
+        return self.share == 1.0
+
+    def values_at(self, index: Mapping[str, int]) -> dict[str, str]:
+        """The count of a cell, in words."""
+        cell = self.dataset[COUNT].isel({str(name): index[str(name)] for name in self.dataset[COUNT].dims})
+        return {"spin reversals": str(int(cell))}
+
+
+@dataclass(eq=False)
+class Body(Job):
+    """The counts of the map of a state whose parameters `changed` differ from the dataset's (`cell`)."""
+
+    source: Source | None = None
+    state: State | None = None
+
+    def counts_for(self, state: State) -> bool:
+        """Return whether the map of `state` has the same cells."""
+        mine = self.state
+        return mine is not None and (mine.x, mine.y, mine.at, mine.changed) == (
+            state.x,
+            state.y,
+            state.at,
+            state.changed,
+        )
+
+    def begin(self, setup: Setup) -> Iterator[Counts]:
+        assert self.source is not None
+        assert self.state is not None
+        return counts(setup, self.source, self.state, self)
+
+
+def can_change(setup: Setup | None, source: Source) -> Cell:
+    """Return the parameters of which other values can be foreseen: those that are constant, if the model has two modes.
+
+    A parameter that is zero has no scale for a slider.
+    """
+    if not setup or MODES not in setup.config.equations.offers or not set(source.dims) <= set(setup.base):
+        return {}
+    return {name: value for name, value in setup.base.items() if name not in source.dims and value}
+
+
+def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -> Iterator[Counts]:
+    """Yield the map of counts of a state: of few cells and of all as foreseen, then with ever more simulated ones."""
+    axes = {name: source.axes[name].values for name in (state.y, state.x) if name}
+    every = [-(-len(values) // _MOST) for values in axes.values()]
+    shape = [-(-len(values) // n) for values, n in zip(axes.values(), every, strict=True)]
+    taken = np.meshgrid(*(values[::n] for values, n in zip(axes.values(), every, strict=True)), indexing="ij")
+    fixed = {**setup.base, **source.parameters_at(tuple(setup.base), state.at), **state.changed}
+    columns = {name: np.full(taken[0].size, value) for name, value in fixed.items()}
+    columns |= {name: values.ravel() for name, values in zip(axes, taken, strict=True)}
+    place = np.arange(taken[0].size).reshape(shape)
+    status = np.where(setup.config.equations.impossible(columns), IMPOSSIBLE, SETTLED)
+    found, simulated = np.zeros(status.shape, "int16"), status == IMPOSSIBLE
+
+    def labelled() -> Counts:
+        whole = np.ix_(*(np.arange(len(values)) // n for values, n in zip(axes.values(), every, strict=True)))
+        arrays = {COUNT: found, "status": status.astype("int8")}
+        known = {name: ([*axes], values.reshape(shape)[whole]) for name, values in arrays.items()}
+        dataset = xr.Dataset(known, {**fixed, **{name: source.dataset[name] for name in axes}})
+        share = float(simulated.mean())
+        dataset[COUNT].attrs["long_name"] = f"spin reversals, {_words(share)}, {changes(source, state.changed)}"
+        return Counts(dataset, share)
+
+    for spread in (_COARSE, 1):
+        some = place[tuple(slice(None, None, spread) for _ in shape)]
+        theirs = {name: values[some.ravel()] for name, values in columns.items()}
+        values = foreseen(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
+        found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
+        yield (last := labelled())
+    moved = time.monotonic()
+    while time.monotonic() < moved + _REST:
+        time.sleep(_REST / 10)
+        yield last
+    config = _counting(setup.config)
+    for spread in _SPREADS:
+        some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
+        some = some[~simulated[some]]
+        for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
+            result = run(_of_cells(config, {name: values[cells] for name, values in columns.items()}, tuple(axes)))
+            found[cells], status[cells], simulated[cells] = result["reversals"], result["status"], True
+            if job:
+                job.share = float(simulated.mean())
+            yield labelled()
+
+
+def changes(source: Source, changed: Cell) -> str:
+    """Say which parameters are not the dataset's."""
+    return ", ".join(labels.measured(source.dataset, name, value) for name, value in changed.items())
+
+
+def _words(share: float) -> str:
+    return "simulated" if share == 1.0 else f"foreseen, {share:.0%} simulated" if share else "foreseen"
+
+
+def _counting(config: Config) -> Config:
+    """Return the configuration whose runs estimate no errors, by the kernel that runs have by default."""
+    integrator = config.integrator.model_copy(update={"estimate_errors": False})
+    return replace(config, measure=measures.default(config.equations), integrator=integrator, picture=())
+
+
+def _of_cells(config: Config, columns: Mapping[str, Array], axes: tuple[str, ...]) -> Config:
+    cases = {name: tuple(columns[name].tolist()) for name in axes}
+    one = {name: Values.one(float(values[0])) for name, values in columns.items() if name not in axes}
+    return replace(config, parameters=one, cases=cases)

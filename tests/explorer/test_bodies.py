@@ -1,0 +1,71 @@
+"""Counts of bodies that a dataset does not have: foreseen as by `predict`, and in the end those of a run."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sweep
+from sweep.explorer import bodies, state
+from sweep.explorer.bodies import COUNT
+from sweep.explorer.setup import Setup, usable
+from sweep.explorer.slices import Source
+from sweep.kernels.status import TOPPLED
+
+RUN: dict[str, Any] = {
+    "body": {"b": [0.5, 2.0, 3.0, 4.0, 5.0]}, "friction": {"mu": [30, 50, 70, 90, 110]}, "start": {"n0": 0.05},
+    "integrator": {"t_end": 1500}, "measure": ["reversals"],
+}  # fmt: skip
+
+
+def a_source(**more: Any) -> tuple[Source, Setup]:
+    source = Source(sweep.run(RUN | more))
+    return source, Setup(source)
+
+
+def test_counts_are_foreseen_and_then_simulated() -> None:
+    source, setup = a_source()
+    shown = replace(state.first(source), changed={"delta": 0.05})
+    coarse, *_, last = found = list(bodies.counts(setup, source, shown))
+    other = RUN | {"body": {"b": RUN["body"]["b"], "delta": 0.05}}
+    foreseen = sweep.predict(other | {"measure": ["reversals", "foreseen"]})[COUNT].transpose(*last.dataset[COUNT].dims)
+    np.testing.assert_array_equal(found[1].dataset[COUNT], foreseen)
+    np.testing.assert_array_equal(coarse.dataset[COUNT], foreseen[[0, 0, 0, 0, 4]][:, [0, 0, 0, 0, 4]])
+    for name, of_run in ((COUNT, "reversals"), ("status", "status")):
+        simulated = sweep.run(other)[of_run].transpose(*last.dataset[name].dims)
+        np.testing.assert_array_equal(last.dataset[name], simulated, name)
+    assert (last.dataset["status"].sel(b=0.5) == TOPPLED).all()
+    assert [each.whole for each in found] == [*[False] * (len(found) - 1), True]
+    assert found[1].dataset[COUNT].attrs["long_name"] == "spin reversals, foreseen, δ = 0.05 rad"
+    assert last.dataset[COUNT].attrs["long_name"] == "spin reversals, simulated, δ = 0.05 rad"
+
+
+def test_a_value_stands_for_those_beside_it_on_a_long_axis() -> None:
+    source, setup = a_source(friction={"mu": {"start": 20, "stop": 120, "num": 130}}, body={"b": 3})
+    shown = replace(state.first(source), changed={"a": 11.0})
+    _, fine, *_, last = bodies.counts(setup, source, shown)
+    values = fine.dataset[COUNT].values
+    assert values.shape == last.dataset[COUNT].shape == (130,)
+    np.testing.assert_array_equal(values[1::3], values[:-1:3])
+    assert np.unique(values).size > 1
+
+
+def test_what_can_be_changed() -> None:
+    """What is constant and has a scale, where two modes make the count; nothing in a table of cases."""
+    source, setup = a_source(start={"n0": 0.05, "x0": 0.0})
+    assert bodies.can_change(setup, source).keys() == {"a", "c", "delta", "n0", "y0"}
+    assert bodies.can_change(None, source) == {}
+    for more in ({"model": "averaged"}, {"body": {}, "cases": {"b": [2.0, 3.0]}, "friction": {"mu": 60}}):
+        source = Source(sweep.run(RUN | {"body": {"b": [2.0, 3.0]}} | more))
+        assert bodies.can_change(usable(source), source) == {}
+
+
+@pytest.mark.parametrize(("text", "fault"), [("delta:0.05", ""), ("delta:x", "delta has to be"), ("q:1", "q is not a")])
+def test_an_address_names_another_body(text: str, fault: str, source: Source, setup: Setup) -> None:
+    found, faults = state.read({"with": [text]}, source, setup.base)
+    assert found.changed == ({} if fault else {"delta": 0.05})
+    assert fault in "".join(faults)
+    again, faults = state.read({"with": ["delta:0.05,mu:7"]}, source, setup.base)
+    assert (again.changed, faults) == ({"delta": 0.05}, [])
+    assert "with=delta:0.05" in state.write(again, source, setup.base)
