@@ -452,8 +452,8 @@ class Machine(RuleBasedStateMachine):
             self.others.append(cut)
 
     def _saved(self, dataset: xr.Dataset, file: Path) -> bool:
-        """Whether xarray can save a dataset: one that is stacked it cannot."""
-        with suppress(ValueError, NotImplementedError):
+        """Whether xarray can save a dataset: one that is stacked, or that is from a file and empty, it cannot."""
+        with suppress(ValueError, NotImplementedError, RuntimeError):
             dataset.to_netcdf(file)
         return file.exists()
 
