@@ -62,6 +62,10 @@ _ROUGHLY = 1e-5
 # tenth of the range.
 _ROUNDS, _WIDENED = 4, (0.1, 0.5)
 
+_MOST_STEPS = 1e6
+"""Largest number of steps of the usual trajectory of a fit: random films take 3,000 to 30,000, those whose degrees are
+taken for radians a million and more."""
+
 _OPTIONAL = ("sigma",)
 """Parameters that every law has, and that are zero unless a configuration names them."""
 
@@ -95,7 +99,9 @@ def fit(
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
         raise ConfigError([config.fault(("start", "x0"), f"the range of a free parameter is too wide: {off}")])
     with blamed(config.origin):
-        problem, minima = _found(Problem(config, film, sought, _countable(film)), note)
+        problem = Problem(config, film, sought, _countable(film))
+        _check_length(problem)
+        problem, minima = _found(problem, note)
         found, limits, rugged = intervals(problem, minima, note)
         (best,) = _turned(problem, [found])
         if best is not found:
@@ -103,6 +109,18 @@ def fit(
             limits[..., at] = 1 - limits[:, ::-1][..., at]
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
     return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, compared=compared)
+
+
+def _check_length(problem: Problem) -> None:
+    """Raise a `ConfigError` if a fit would take hours, as it does for a film whose unit is wrong."""
+    steps = problem.length(qmc.Sobol(len(problem.free), rng=0).random(64))
+    if len(steps) and (usual := float(np.median(steps))) > _MOST_STEPS:
+        film = problem.film
+        raise fault_of(
+            f"a trajectory over the film takes {usual:.1g} steps, and a fit needs thousands of trajectories; check the "
+            f"units of the film, which shows up to {np.abs(film.value).max():.3g} and lasts {film.time[-1]:.3g}, and "
+            "those of the body"
+        )
 
 
 def with_optional(config: Config, free: Sequence[str]) -> Config:

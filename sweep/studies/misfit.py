@@ -109,6 +109,13 @@ class Problem:
         """Return the free parameters at places of shape (cells, free), by name."""
         return {name: np.ascontiguousarray(each) for name, each in zip(self.free, self.values(places).T, strict=True)}
 
+    def length(self, places: Array) -> Array:
+        """Return the number of steps to the end of the film, shape (cells,) or less: of bodies that can be."""
+        model, columns = self.config.equations, self.columns(places)
+        possible = ~model.impossible(columns)
+        columns = {name: values[possible] for name, values in columns.items()}
+        return np.asarray(self.film.time[-1] / automatic_step(PLAIN, model, columns)[0])
+
     def curves(self, places: Array, times: Array, steps: Array | None = None) -> Array:
         """Return what a film of the trajectories at `places` would show, shape (cells, times); NaN for lost ones.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, cast, get_args
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -427,6 +428,17 @@ def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: 
     film = Film(np.arange(3.0), np.array([0.05, np.nan, 0.05]))
     with pytest.raises(ConfigError, match="not a number; leave out that instant"):
         sweep.fit(write(SCENE), film, ["mu"], n0=0.05, laws=laws, progress=False)
+
+
+def test_degrees_taken_for_radians_are_refused_at_once(write: Write) -> None:
+    """Their fit would take hours; one of the same film in radians begins."""
+    times = np.linspace(0, 6, 200)
+    stone = write(STONE.replace("mu: [0.1, 0.9], speed: [0.2, 1.5]", "mu: 0.3, speed: 0.01"))
+    spins, free = 6.5 * np.exp(-times / 0.4), ["mu", "n0", "x0", "y0"]
+    with pytest.raises(ConfigError, match=r"takes \S+ steps, .*; check the units of the film, which shows up to 372"):
+        sweep.fit(stone, Film(times, np.degrees(spins)), free, progress=False, t_end=10)
+    with patch("sweep.studies.fit._found", Mock(side_effect=InterruptedError)), pytest.raises(InterruptedError):
+        sweep.fit(stone, Film(times, spins), free, progress=False, t_end=10)
 
 
 @pytest.mark.parametrize(
