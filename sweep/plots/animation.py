@@ -32,6 +32,9 @@ SECONDS = 10.0
 
 FRAMES_A_SECOND = 20
 
+MOST_FRAMES = 1200
+"""Largest number of frames of a clip that is kept in memory until it is written, which takes a megabyte a frame."""
+
 _BEYOND = 2.0
 """End of a clip, relative to the latest first reversal of its bodies, which is thus in the middle."""
 
@@ -68,6 +71,10 @@ def animate(
         raise fault_of(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
     seconds = SECONDS if speed is None else (end - begin) / speed
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
+    if path is not None and suffix(path) != "mp4" and count > MOST_FRAMES + 1:
+        longest = MOST_FRAMES / FRAMES_A_SECOND
+        words = f"the clip would last {seconds:.3g} s, and a {suffix(path)} at most {longest:.0f} s"
+        raise fault_of(f"{words}; give a speed of {(end - begin) / longest:.3g} or more, or write an mp4", "speed")
     scene = _Scene(shown, np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:

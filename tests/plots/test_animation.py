@@ -128,6 +128,10 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     for speed in (0, -5, np.nan):
         with pytest.raises(ConfigError, match=f"speed: {speed:g}; give a number above zero"):
             animation.animate(turning(), speed=speed)
+    with pytest.raises(
+        ConfigError, match=r"speed: the clip would last 80 s, and a gif at most 60 s; give a speed of 0.133"
+    ):
+        animation.animate(turning(), tmp_path / "clip.gif", end=8, speed=0.1)
     without = mpl.rc_context({"animation.ffmpeg_path": "no-such-program"})
     with without, pytest.raises(ConfigError, match="ffmpeg, which is not installed"):
         animation.animate(turning(), tmp_path / "clip.mp4")
