@@ -320,7 +320,7 @@ def animate(
     ------
     ConfigError
         as `trajectory`; also if there are too many bodies or they have no attitude, the interval is empty, the speed is
-        not positive, or the format is unknown.
+        not positive, the clip is too long for its format, or the format is unknown.
     StoreError
         if the file is not a dataset, or `output` cannot be written.
     """

@@ -492,7 +492,7 @@ class Machine(RuleBasedStateMachine):
                 assert oracles.content(turned) == oracles.content(figure), "another picture backwards"
 
     @precondition(lambda self: self.browser)
-    @rule(which=NUMBER, addressed=draws.draws(["show", "x", "y", "low", "high", "n0"], 5))
+    @rule(which=NUMBER, addressed=draws.draws(["show", "x", "y", "low", "high", "n0", "with"], 5))
     def explore(self, which: int, addressed: Draws) -> None:
         """The document of the explorer, at any address."""
         from bokeh.document import Document
@@ -502,7 +502,7 @@ class Machine(RuleBasedStateMachine):
         from sweep.explorer.view import View
 
         dataset = self.others[which % len(self.others)]
-        texts = [*map(str, dataset.data_vars), *map(str, dataset.dims), "1", "1e7", "x"]
+        texts = [*map(str, dataset.data_vars), *map(str, dataset.dims), "1", "1e7", "x", "a:12,mu:70"]
         query = {key: [texts[n % len(texts)]] for key, n in addressed}
         document = Document()
         source = self.ask("open", lambda: Source(dataset))
