@@ -79,7 +79,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
     entries = _series(first, dataset, only) if only else _spin(first, dataset)
-    first.set_xlim(0, lively_until(dataset))
+    first.set_xlim(0, lively_until(dataset) or None)  # a body may fail at its first instant
     odd = len(panels) % 2  # the last of an odd number of panels is as wide as the spin
     places = [grid[1 + k // 2, k % 2 if k + odd < len(panels) else slice(None)] for k in range(len(panels))]
     below = [figure.add_subplot(place, sharex=first) for place in places]

@@ -112,6 +112,13 @@ def test_the_time_axis_ends_a_while_after_the_last_event() -> None:
     assert picture.plot(turning).axes[0].get_xlim() == (0, 100)
 
 
+def test_a_single_instant_has_an_axis() -> None:
+    """That of a body which fails at once, for example."""
+    figure = picture.plot(made([60]).isel(time=[0]))
+    low, high = figure.axes[0].get_xlim()
+    assert low == 0 < high
+
+
 def test_a_column_shows_the_spin_alone() -> None:
     figure = picture.plot(made([60, 100]), width="85mm")
     (axes,) = figure.axes
