@@ -169,6 +169,17 @@ def threads() -> int:
     return 1 if INTERPRETED else int(load_numba().get_num_threads())
 
 
+@contextmanager
+def all_threads() -> Iterator[None]:
+    """Let parallel functions run on all threads within, also if the calling thread has fewer."""
+    numba, usual = load_numba(), threads()
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(usual)
+
+
 def on_all_threads(function: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
     """Call `function` for each of `items`, and return what it returns.
 

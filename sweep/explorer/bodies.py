@@ -10,12 +10,14 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config, Values
+from sweep.engine.reporter import Progress
 from sweep.engine.run import run
-from sweep.explorer.runner import Job
+from sweep.explorer.runner import Dropped, Job
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
 from sweep.grid import Array
+from sweep.jit import all_threads
 from sweep.kernels import measures
 from sweep.kernels.status import IMPOSSIBLE, SETTLED
 from sweep.models.model import MODES
@@ -31,8 +33,9 @@ _MOST = 64
 _COARSE, _SPREADS = 4, (4, 2, 1)
 """The first map has every fourth value along each axis; simulated cells fill a map in this order."""
 
-_REST = 0.5
-"""Seconds for which the sliders have to rest before a body is simulated, because its runs hold up the page."""
+_REST = 0.3
+"""Seconds for which the sliders have to rest before more cells are foreseen, and simulated: it takes all cores from the
+page."""
 
 _TOGETHER = 256
 """Cells that are simulated together; between them the page's trajectories go on."""
@@ -71,6 +74,11 @@ class Body(Job):
             state.at,
             state.changed,
         )
+
+    def chunk(self, progress: Progress) -> None:  # noqa: ARG002  of the cells that are simulated together
+        """End the run by `Dropped` if it is no longer needed."""
+        if self.dropped:
+            raise Dropped
 
     def begin(self, setup: Setup) -> Iterator[Counts]:
         assert self.source is not None
@@ -113,23 +121,30 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     for spread in (_COARSE, 1):
         some = place[tuple(slice(None, None, spread) for _ in shape)]
         theirs = {name: values[some.ravel()] for name, values in columns.items()}
-        values = foreseen(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
+        with all_threads():
+            values = foreseen(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
         found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
         yield (last := labelled())
-    moved = time.monotonic()
-    while time.monotonic() < moved + _REST:
-        time.sleep(_REST / 10)
-        yield last
+        yield from _resting(last)
     config = _counting(setup.config)
     for spread in _SPREADS:
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[~simulated[some]]
         for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
-            result = run(_of_cells(config, {name: values[cells] for name, values in columns.items()}, tuple(axes)))
+            theirs = {name: values[cells] for name, values in columns.items()}
+            with all_threads():
+                result = run(_of_cells(config, theirs, tuple(axes)), reporter=job)
             found[cells], status[cells], simulated[cells] = result["reversals"], result["status"], True
             if job:
                 job.share = float(simulated.mean())
             yield labelled()
+
+
+def _resting(last: Counts) -> Iterator[Counts]:
+    began = time.monotonic()
+    while time.monotonic() < began + _REST:
+        time.sleep(_REST / 10)
+        yield last
 
 
 def changes(source: Source, changed: Cell) -> str:

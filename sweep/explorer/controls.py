@@ -91,7 +91,7 @@ class BodyControls:
         self._sliders = {name: self._slider(source, name, value) for name, value in values.items()}
         self._back = Button(label="Back to the dataset", name="back", width=150, visible=False)
         self._back.on_click(lambda: change(lambda state: replace(state, changed={})))
-        self.root = Row(*self._sliders.values(), self._back, name="body", visible=bool(values), stylesheets=[WIDGETS],
+        self.root = Row(*self._sliders.values(), self._back, name="other", visible=bool(values), stylesheets=[WIDGETS],
                         sizing_mode="stretch_width",
                         styles={"gap": "6px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 

@@ -46,6 +46,9 @@ class MapFigure:
     The models stay the same from slice to slice, because a browser keeps models that are replaced.
     """
 
+    _look: tuple[Any, ...] = ()
+    """What decides how the scale looks."""
+
     def __init__(self, source: Source, x: str, y: str) -> None:
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
@@ -112,19 +115,26 @@ class MapFigure:
         at = {"x": self._x.place(part.x.values[across]), "y": self._y.place(part.y.values[up])}
         self._uncertain.data_source.data = at
         self._uncertain.glyph.size = float(np.clip(120 / max(part.values.shape), 2.0, 6.0))
+        unit = labels.unit(known, part.name) if part.name in known else ""
+        self.figure.title.text = labels.with_unit(labels.words(known, part.name), unit)
+        look = (part.name, unit, part.flags, scale.ticks, style.mapping(scale))
+        if look != self._look:  # new models take a third of a second
+            self._look = look
+            self._explain(part, scale, unit, mapper)
+        return part, scale
+
+    def _explain(self, part: Map, scale: Scale, unit: str, mapper: Any) -> None:
+        """Give bar, cuts and tooltips the numbers or the words of a scale."""
         for cut in self._cuts:
             words = (scale.ticks or {}) if part.flags else {}
             ticker = models.FixedTicker(ticks=list(words), minor_ticks=[]) if words else models.BasicTicker()
             cut["plot"].yaxis.update(ticker=ticker, major_label_overrides=words)
-        unit = labels.unit(known, part.name) if part.name in known else ""
-        self.figure.title.text = labels.with_unit(labels.words(known, part.name), unit)
         # A new bar, because an old one omits ticks beyond its first scale.
         self.figure.right = [_bar(unit, scale, mapper)]
         flags = {str(k): words for k, words in part.flags.items()}
         code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
         self._hover.tooltips = [(self._source.words(part.name), "@image{custom}")]
         self._hover.formatters = {"@image": models.CustomJSHover(args={"words": flags}, code=code)}
-        return part, scale
 
 
 def _bar(unit: str, scale: Scale, mapper: Any) -> models.ColorBar:

@@ -15,6 +15,7 @@ from sweep.config import Config, ConfigError
 from sweep.config.distributions import chances
 from sweep.engine.whole import Whole
 from sweep.grid import Array
+from sweep.kernels.measures import chosen
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
 from sweep.studies.search import require_simulated
@@ -59,6 +60,8 @@ def designed(config: Config) -> Config:
     if config.axes:
         name = next(iter(config.axes))
         raise ConfigError([config.fault(config.table[name].place, "cannot be an axis of indices; give one number")])
+    if not any(name in each.variables for each in chosen(config.measure) for name in QUANTITIES):
+        raise ConfigError([config.fault(("measure",), "has no quantity that indices are computed of; add reversals")])
     known = config.distributions
     first, second = np.split(chances(2 * len(known), 1 << (config.samples - 1).bit_length(), config.seed), 2, axis=1)
     mixed = [np.where(np.arange(len(known)) == i, second, first) for i in range(len(known))]

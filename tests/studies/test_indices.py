@@ -96,6 +96,7 @@ def test_the_command_resumes_and_says_what_it_found(write: Write, tmp_path: Path
         ("b: 3", "b: [3, 4]", "body.b: cannot be an axis of indices; give one number"),
         ("model: averaged", "model: analytic", "is not simulated"),
         (SCENE, "friction: {mu: 60}\n", "no parameter is a distribution; give one"),
+        ("measure: [reversals]", "measure: []", "measure: has no quantity that indices are computed of; add reversals"),
     ],
 )
 def test_what_has_no_indices_is_refused(write: Write, old: str, new: str, words: str) -> None:
