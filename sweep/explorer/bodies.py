@@ -67,13 +67,8 @@ class Body(Job):
 
     def counts_for(self, state: State) -> bool:
         """Return whether the map of `state` has the same cells."""
-        mine = self.state
-        return mine is not None and (mine.x, mine.y, mine.at, mine.changed) == (
-            state.x,
-            state.y,
-            state.at,
-            state.changed,
-        )
+        names = ("x", "y", "at", "changed")
+        return all(getattr(self.state, name) == getattr(state, name) for name in names)
 
     def chunk(self, progress: Progress) -> None:  # noqa: ARG002  of the cells that are simulated together
         """End the run by `Dropped` if it is no longer needed."""
@@ -106,15 +101,18 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     columns = {name: np.full(taken[0].size, value) for name, value in fixed.items()}
     columns |= {name: values.ravel() for name, values in zip(axes, taken, strict=True)}
     place = np.arange(taken[0].size).reshape(shape)
-    status = np.where(setup.config.equations.impossible(columns), IMPOSSIBLE, SETTLED)
-    found, simulated = np.zeros(status.shape, "int16"), status == IMPOSSIBLE
+    possible = ~setup.config.equations.impossible(columns)
+    status = np.where(possible, SETTLED, IMPOSSIBLE)
+    found, simulated = np.zeros(status.shape, "int16"), np.zeros(status.shape, bool)
 
     def labelled() -> Counts:
         whole = np.ix_(*(np.arange(len(values)) // n for values, n in zip(axes.values(), every, strict=True)))
         arrays = {COUNT: found, "status": status.astype("int8")}
         known = {name: ([*axes], values.reshape(shape)[whole]) for name, values in arrays.items()}
         dataset = xr.Dataset(known, {**fixed, **{name: source.dataset[name] for name in axes}})
-        share = float(simulated.mean())
+        share = float(simulated.sum() / possible.sum()) if possible.any() else 1.0
+        if job:
+            job.share = share
         dataset[COUNT].attrs["long_name"] = f"spin reversals, {_words(share)}, {changes(source, state.changed)}"
         return Counts(dataset, share)
 
@@ -129,14 +127,12 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     config = _counting(setup.config)
     for spread in _SPREADS:
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
-        some = some[~simulated[some]]
+        some = some[possible[some] & ~simulated[some]]
         for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
             theirs = {name: values[cells] for name, values in columns.items()}
             with all_threads():
                 result = run(_of_cells(config, theirs, tuple(axes)), reporter=job)
             found[cells], status[cells], simulated[cells] = result["reversals"], result["status"], True
-            if job:
-                job.share = float(simulated.mean())
             yield labelled()
 
 
@@ -159,7 +155,9 @@ def _words(share: float) -> str:
 def _counting(config: Config) -> Config:
     """Return the configuration whose runs estimate no errors, by the kernel that runs have by default."""
     integrator = config.integrator.model_copy(update={"estimate_errors": False})
-    return replace(config, measure=measures.default(config.equations), integrator=integrator, picture=())
+    return replace(
+        config, measure=measures.default(config.equations), integrator=integrator, picture=(), samples=None, refine=0
+    )
 
 
 def _of_cells(config: Config, columns: Mapping[str, Array], axes: tuple[str, ...]) -> Config:
