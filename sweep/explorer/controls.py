@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from bokeh.models import Button, CustomJSTickFormatter, Row, Select, Slider, TextInput
+from bokeh.models import Button, CustomJSTickFormatter, Div, Row, Select, Slider, TextInput
 
 from sweep.explorer.slices import Source
 from sweep.explorer.state import LIMITS, Cell, Choice, State, choices, limit
@@ -91,8 +91,9 @@ class BodyControls:
         self._sliders = {name: self._slider(source, name, value) for name, value in values.items()}
         self._back = Button(label="Back to the dataset", name="back", width=150, visible=False)
         self._back.on_click(lambda: change(lambda state: replace(state, changed={})))
-        self.root = Row(*self._sliders.values(), self._back, name="other", visible=bool(values), stylesheets=[WIDGETS],
-                        sizing_mode="stretch_width",
+        words = Div(text="Counts of another body:", styles={"font-size": "12px", "color": "#5b6875"}, width=150)
+        self.root = Row(words, *self._sliders.values(), self._back, name="other", visible=bool(values),
+                        stylesheets=[WIDGETS], sizing_mode="stretch_width",
                         styles={"gap": "6px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:
