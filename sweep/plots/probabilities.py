@@ -45,13 +45,15 @@ def _curves(axes: Axes, chosen: xr.Dataset, x: str) -> None:
     at = chosen[x].values
     set_scale(axes, "x", at)
     axes.update_datalim([(value, 0.0) for value in at])  # also where all samples failed
+    known = {"probability_low", "probability_high"} <= each.data_vars.keys()
     for i, colour in enumerate(colours):
         one = each.isel(count=i)
         axes.plot(at, one["probability"], ".-", color=colour, linewidth=1.2, label=title(each, {"count": i}))
-        ends = one["probability_low"], one["probability_high"]
-        axes.fill_between(at, *ends, color=colour, alpha=0.25, linewidth=0)
-        axes.vlines(at, *ends, color=colour, linewidth=0.6)  # a point between failures has no band
-    axes.set_ylabel("probability, with its interval of 95 %")
+        if known:
+            ends = one["probability_low"], one["probability_high"]
+            axes.fill_between(at, *ends, color=colour, alpha=0.25, linewidth=0)
+            axes.vlines(at, *ends, color=colour, linewidth=0.6)  # a point between failures has no band
+    axes.set_ylabel("probability, with its interval of 95 %" if known else "probability")
 
 
 def _bars(axes: Axes, chosen: xr.Dataset, *, lowest: bool) -> None:

@@ -143,6 +143,15 @@ def test_samples_without_a_status_or_counts() -> None:
         picture.plot(sampled(), "reversals", y="count")
 
 
+def test_probabilities_without_an_end_of_their_interval_have_no_band() -> None:
+    whole, part = (
+        picture.plot(each, "probability").axes[0] for each in (sampled(), sampled().drop_vars("probability_low"))
+    )
+    assert (whole.get_ylabel(), part.get_ylabel()) == ("probability, with its interval of 95 %", "probability")
+    assert len(whole.collections) > len(part.collections) == 0
+    assert len(whole.lines) == len(part.lines)
+
+
 def test_samples_at_one_value_are_bars_under_its_name() -> None:
     (axes,) = picture.plot(sampled((0.05,))).axes
     bars: Any = axes.patches
