@@ -146,9 +146,11 @@ def first_tolerance(config: Config, grid: Grid) -> Array:
     how, model, columns = config.integrator, config.equations, grid.columns()
     if not (how.estimate_errors and config.repeats and how.step == "auto"):
         return np.full(grid.size, how.tolerance)
-    with np.errstate(all="ignore"):  # impossible bodies
-        slow = fastest_spin(model, columns) * model.slower_period(columns) < _SLOW
-        least = np.where(slow, _DECAY_TIMES * decay_times(model, grid) * model.spin_unit(columns), 0.0)
+    least, possible = np.zeros(grid.size), ~model.impossible(columns)
+    columns = {name: values[possible] for name, values in columns.items()}
+    slow = fastest_spin(model, columns) * model.slower_period(columns) < _SLOW
+    decay = decay_times(model, grid)[possible] * model.spin_unit(columns)
+    least[possible] = np.where(slow, _DECAY_TIMES * decay, 0.0)
     return np.asarray(how.tolerance * np.clip(least / TOLERANCE_TIME, 1.0, _LOOSEST))
 
 

@@ -1,4 +1,4 @@
-"""Maps of counts for bodies that the dataset does not have: foreseen at once, and simulated behind that."""
+"""Count the reversals of bodies that differ from the dataset's: foreseen at once, then simulated."""
 
 from __future__ import annotations
 
@@ -28,14 +28,13 @@ COUNT = "reversals_foreseen"
 """The variable of the maps, until it is simulated everywhere."""
 
 _MOST = 64
-"""Most values along an axis: of a longer one every second, third, … stands for those beside it."""
+"""Largest number of values along an axis; on a longer one, every second or third … value represents its neighbours."""
 
 _COARSE, _SPREADS = 4, (4, 2, 1)
 """The first map has every fourth value along each axis; simulated cells fill a map in this order."""
 
 _REST = 0.3
-"""Seconds for which the sliders have to rest before more cells are foreseen, and simulated: it takes all cores from the
-page."""
+"""Seconds for which the sliders must rest before more cells are foreseen or simulated, which slows the page."""
 
 _TOGETHER = 256
 """Cells that are simulated together; between them the page's trajectories go on."""
@@ -58,12 +57,12 @@ class Counts:
         return {"spin reversals": str(int(cell))}
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Body(Job):
     """The counts of the map of a state whose parameters `changed` differ from the dataset's (`cell`)."""
 
-    source: Source | None = None
-    state: State | None = None
+    source: Source
+    state: State
 
     def counts_for(self, state: State) -> bool:
         """Return whether the map of `state` has the same cells."""
@@ -76,15 +75,13 @@ class Body(Job):
             raise Dropped
 
     def begin(self, setup: Setup) -> Iterator[Counts]:
-        assert self.source is not None
-        assert self.state is not None
         return counts(setup, self.source, self.state, self)
 
 
 def can_change(setup: Setup | None, source: Source) -> Cell:
-    """Return the parameters of which other values can be foreseen: those that are constant, if the model has two modes.
+    """Return the parameters that sliders can change, with the dataset's values; none if its model has no two modes.
 
-    A parameter that is zero has no scale for a slider.
+    They are constant in the dataset, and not zero, which gives a slider no scale.
     """
     if not setup or MODES not in setup.config.equations.offers or not set(source.dims) <= set(setup.base):
         return {}
@@ -94,9 +91,9 @@ def can_change(setup: Setup | None, source: Source) -> Cell:
 def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -> Iterator[Counts]:
     """Yield the map of counts of a state: of few cells and of all as foreseen, then with ever more simulated ones."""
     axes = {name: source.axes[name].values for name in (state.y, state.x) if name}
-    every = [-(-len(values) // _MOST) for values in axes.values()]
-    shape = [-(-len(values) // n) for values, n in zip(axes.values(), every, strict=True)]
-    taken = np.meshgrid(*(values[::n] for values, n in zip(axes.values(), every, strict=True)), indexing="ij")
+    every = {name: -(-len(values) // _MOST) for name, values in axes.items()}
+    taken = np.meshgrid(*(values[:: every[name]] for name, values in axes.items()), indexing="ij")
+    shape = taken[0].shape
     fixed = {**setup.base, **source.parameters_at(tuple(setup.base), state.at), **state.changed}
     columns = {name: np.full(taken[0].size, value) for name, value in fixed.items()}
     columns |= {name: values.ravel() for name, values in zip(axes, taken, strict=True)}
@@ -106,7 +103,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     found, simulated = np.zeros(status.shape, "int16"), np.zeros(status.shape, bool)
 
     def labelled() -> Counts:
-        whole = np.ix_(*(np.arange(len(values)) // n for values, n in zip(axes.values(), every, strict=True)))
+        whole = np.ix_(*(np.arange(len(values)) // every[name] for name, values in axes.items()))
         arrays = {COUNT: found, "status": status.astype("int8")}
         known = {name: ([*axes], values.reshape(shape)[whole]) for name, values in arrays.items()}
         dataset = xr.Dataset(known, {**fixed, **{name: source.dataset[name] for name in axes}})

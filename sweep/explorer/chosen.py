@@ -83,8 +83,9 @@ class _Input:
     def __init__(self, source: Source, parameter: Parameter, edited: Callable[[float], None]) -> None:
         name = parameter.name
         axis = self._axis = source.axes.get(name)
-        title = labels.with_unit(labels.symbol(name), labels.si_unit(source.dataset, name).strip())
-        self.field = TextInput(value="", width=96, title=title, stylesheets=[BARE], name=f"parameter {name}")
+        self.field = TextInput(
+            value="", width=96, title=source.symbol(name), stylesheets=[BARE], name=f"parameter {name}"
+        )
         on(self.field, "value", lambda text: edited(number(text)))
         self.slider: Slider | None = None
         if axis is None or len(axis.values) < 2:

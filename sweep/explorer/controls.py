@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -11,9 +11,8 @@ from typing import Any
 from bokeh.models import Button, CustomJSTickFormatter, Div, Row, Select, Slider, TextInput
 
 from sweep.explorer.slices import Source
-from sweep.explorer.state import LIMITS, Cell, Choice, State, choices, limit
-from sweep.parameters import PARAMETERS
-from sweep.plots import labels
+from sweep.explorer.state import LIMITS, Cell, Choice, State, choices, limit, wrong_value
+from sweep.parameters import Parameter
 
 WIDGETS = ":host { color: #1b2733; color-scheme: light; filter: var(--widgets) }"
 """Style of the outermost widgets, which a dark page inverts."""
@@ -86,8 +85,11 @@ class BodyControls:
 
     _SPAN = 4.0
 
-    def __init__(self, source: Source, values: Cell, change: Callable[[Callable[[State], State]], None]) -> None:
-        self._values, self._change, self._quiet = values, change, False
+    def __init__(
+        self, source: Source, values: Cell, known: Mapping[str, Parameter],
+        change: Callable[[Callable[[State], State]], None],
+    ) -> None:  # fmt: skip
+        self._values, self._known, self._change, self._quiet = values, known, change, False
         self._sliders = {name: self._slider(source, name, value) for name, value in values.items()}
         self._back = Button(label="Back to the dataset", name="back", width=150, visible=False)
         self._back.on_click(lambda: change(lambda state: replace(state, changed={})))
@@ -110,8 +112,7 @@ class BodyControls:
     def _slider(self, source: Source, name: str, value: float) -> Slider:
         code = "return sweep.number(Number((value * span ** tick).toPrecision(3)))"
         words = CustomJSTickFormatter(args={"value": value, "span": self._SPAN}, code=code)
-        title = labels.with_unit(labels.symbol(name), labels.si_unit(source.dataset, name).strip())
-        slider = Slider(start=-1, end=1, step=0.01, value=0, width=150, title=title, format=words,
+        slider = Slider(start=-1, end=1, step=0.01, value=0, width=150, title=source.symbol(name), format=words,
                         name=f"body {name}", stylesheets=[BARE])  # fmt: skip
         on(slider, "value", partial(self._moved, name))
         return slider
@@ -123,11 +124,11 @@ class BodyControls:
 
     def _moved(self, name: str, place: float) -> None:
         value = self._at(name, place)
-        if self._quiet or not PARAMETERS[name].allows(value):
+        if self._quiet or wrong_value(self._known[name], value):
             return
-        changed = {name: value} if place else {}
-        self._change(lambda state: replace(state, changed=_without(state.changed, name) | changed))
 
+        def put(state: State) -> State:
+            changed = {**state.changed, name: value}
+            return replace(state, changed={key: at for key, at in changed.items() if at != self._values.get(key)})
 
-def _without(cell: Cell, name: str) -> dict[str, float]:
-    return {key: value for key, value in cell.items() if key != name}
+        self._change(put)

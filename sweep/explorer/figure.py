@@ -47,7 +47,7 @@ class MapFigure:
     """
 
     _look: tuple[Any, ...] = ()
-    """What decides how the scale looks."""
+    """Everything that bar, cuts and tooltips were last labelled for."""
 
     def __init__(self, source: Source, x: str, y: str) -> None:
         self._source, self.axes = source, (x, y)
@@ -88,7 +88,7 @@ class MapFigure:
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
     def show(self, state: State, other: xr.Dataset | None = None) -> tuple[Map, Scale]:
-        """Show the variable of a state, or the first one of `other` over its axes; returns map and colour scale."""
+        """Show the variable of a state, or the first variable of `other`; return its map and its colour scale."""
         if other is None:
             part, known = self._source.map(state.show, *self.axes, state.at), self._source.cell
         else:
@@ -124,7 +124,7 @@ class MapFigure:
         return part, scale
 
     def _explain(self, part: Map, scale: Scale, unit: str, mapper: Any) -> None:
-        """Give bar, cuts and tooltips the numbers or the words of a scale."""
+        """Label the bar, the cuts and the tooltips for a scale."""
         for cut in self._cuts:
             words = (scale.ticks or {}) if part.flags else {}
             ticker = models.FixedTicker(ticks=list(words), minor_ticks=[]) if words else models.BasicTicker()

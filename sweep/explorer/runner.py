@@ -1,4 +1,4 @@
-"""Run what a page waits for in a separate thread, while it stays responsive: trajectories, and counts of bodies."""
+"""Run trajectories and count reversals in a separate thread, so that the page stays responsive."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Dropped(Exception):
 class Job(Reporter):
     """A trajectory that a page waits for; `report` is called with the job, on the runner's thread, when it changes.
 
-    A subclass with another `begin` may be anything else that has a beginning and a `whole`.
+    A subclass can search for something else: its `begin` yields results with an attribute `whole`.
     """
 
     cell: Cell

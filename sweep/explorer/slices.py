@@ -96,6 +96,10 @@ class Source:
         """Return the words for a variable or an axis."""
         return labels.words(self.cell, name)
 
+    def symbol(self, name: str) -> str:
+        """Return the symbol of a parameter, with its unit in SI."""
+        return labels.with_unit(labels.symbol(name), labels.si_unit(self.dataset, name).strip())
+
     @cached_property
     def meanings(self) -> dict[str, str]:
         """The sentences that describe the variables, by their words."""

@@ -32,9 +32,9 @@ class View:
     _curves: Sequence[Curve | None] = ()
     """The curves on the page."""
     _other: bodies.Body | None = None
-    """The search for counts of a body that the dataset does not have, if the page shows one."""
+    """The job that counts the reversals of another body, if the page shows one."""
     _counts: bodies.Counts | None = None
-    """Its counts that are on the page."""
+    """The counts that the map shows; None if it shows the dataset."""
 
     def __init__(
         self, document: Document, source: Source, setup: Setup | None, runner: Runner | None,
@@ -44,6 +44,10 @@ class View:
         self._base: Cell = setup.base if setup else {}
         self._known = setup.config.table if setup else {}
         self.state, self._faults = states.read(query, source, self._base, self._known)
+        self._constants = bodies.can_change(setup, source)
+        if self.state.changed and not self._constants:
+            self._faults.append("with: counts of other bodies cannot be foreseen here")
+            self.state = replace(self.state, changed={})
         self._build()
         self._runner = runner
         self._drawn = Drawn(self.state.cells, runner, self._report)
@@ -64,7 +68,7 @@ class View:
         self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
         self._figures = Curves(str(PARTS.empty()))
         self._controls = controls.MapControls(self._source, self._change)
-        self._body = controls.BodyControls(self._source, bodies.can_change(self._setup, self._source), self._change)
+        self._body = controls.BodyControls(self._source, self._constants, self._known, self._change)
         self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
         self._document.js_on_event("document_ready", self._figures.player.moment)
         for root in (self._controls.root, self._notice, self._map, self._legend, self._body.root, self._cell,
@@ -132,9 +136,9 @@ class View:
             return
         dataset, axes = self._source.dataset, self._source.axes
         here = [labels.measured(dataset, d, axes[d].values[index[d]]) for d in self._source.dims]
-        if self._other and self._other.curve:
+        if self._counts:
             here.append(bodies.changes(self._source, self.state.changed))
-            self._cell.text = str(PARTS.cell(", ".join(here), "", self._other.curve.values_at(index), {}))
+            self._cell.text = str(PARTS.cell(", ".join(here), "", self._counts.values_at(index), {}))
             return
         values = self._source.values_at(index)
         self._cell.text = str(PARTS.cell(", ".join(here), values.pop("note", ""), values, self._source.meanings))

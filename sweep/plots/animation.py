@@ -33,7 +33,7 @@ SECONDS = 10.0
 FRAMES_A_SECOND = 20
 
 MOST_FRAMES = 1200
-"""Largest number of frames of a clip that is kept in memory until it is written, which takes a megabyte a frame."""
+"""Largest number of frames in a gif or html, which stays in memory until it is written: a megabyte a frame."""
 
 _BEYOND = 2.0
 """End of a clip, relative to the latest first reversal of its bodies, which is thus in the middle."""

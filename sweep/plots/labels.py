@@ -13,6 +13,9 @@ from sweep.results.kind import is_of_own_body, parameters
 from sweep.units import SUPERSCRIPT, is_of_paper, pretty
 from sweep.variables import Variable
 
+_ORIGIN = re.compile(", (simulated|foreseen|predicted.*)$")
+"""The end of the words for a variable that has a prediction."""
+
 _RECORDS: Mapping[str, Parameter | Variable] = {**PARAMETERS, **VARIABLES}
 
 
@@ -39,8 +42,9 @@ def short(name: str) -> str:
 
 
 def origin(dataset: xr.Dataset, name: str) -> str:
-    """Return what follows the quantity in the words for a variable: whether it is simulated, foreseen or predicted."""
-    return words(dataset, name).partition(", ")[2] or "simulated"
+    """Return whether a variable is simulated, foreseen or predicted."""
+    found = _ORIGIN.search(words(dataset, name))
+    return found[1] if found else "simulated"
 
 
 def label(dataset: xr.Dataset, name: str) -> str:
@@ -55,7 +59,7 @@ def with_unit(words: str, unit: str) -> str:
 
 def common(dataset: xr.Dataset, name: str) -> str:
     """The label of an axis or a bar that a variable shares with its prediction."""
-    alone = re.sub(", (simulated|foreseen|predicted.*)$", "", words(dataset, name.removesuffix("_predicted")))
+    alone = _ORIGIN.sub("", words(dataset, name.removesuffix("_predicted")))
     return with_unit(alone, unit(dataset, name))
 
 

@@ -81,10 +81,7 @@ class Variant:
             def of(cls, columns: Columns) -> Record:
                 names = (*surface.constants, *rigid_body.BODY)
                 of_body = dict(zip(names, rigid_body.values(columns, surface), strict=True))
-                there = [name for name in known if name in of_body]
-                # The inertia of a body that cannot be may have no inverse.
-                others = [n for n in there if np.any(np.isfinite(of_body[n]) & (of_body[n] != known[n]))]
-                if others:
+                if others := [name for name in known if name in of_body and np.any(of_body[name] != known[name])]:
                     raise ValueError(f"{', '.join(others)}: this scene has no such body; name it in the variant")
                 of_couples = (value for couple in couples for value in couple.of(columns))
                 return cls(*(of_body[name] for name in body), *of_couples, *of_more(columns))
