@@ -63,8 +63,8 @@ _ROUGHLY = 1e-5
 _ROUNDS, _WIDENED = 4, (0.1, 0.5)
 
 _MOST_STEPS = 1e6
-"""Largest number of steps of the usual trajectory of a fit: random films take 3,000 to 30,000, those whose degrees are
-taken for radians a million and more."""
+"""Largest median number of steps per trajectory. Random films take 3,000 to 30,000, and a million or more if degrees
+are taken for radians."""
 
 _OPTIONAL = ("sigma",)
 """Parameters that every law has, and that are zero unless a configuration names them."""
@@ -113,13 +113,13 @@ def fit(
 
 def _check_length(problem: Problem) -> None:
     """Raise a `ConfigError` if a fit would take hours, as it does for a film whose unit is wrong."""
-    steps = problem.length(qmc.Sobol(len(problem.free), rng=0).random(64))
-    if len(steps) and (usual := float(np.median(steps))) > _MOST_STEPS:
-        film = problem.film
+    film, places = problem.film, qmc.Sobol(len(problem.free), rng=0).random(64)
+    usual = float(np.median(film.time[-1] / problem.steps(places)))
+    if usual > _MOST_STEPS:
         raise fault_of(
-            f"a trajectory over the film takes {usual:.1g} steps, and a fit needs thousands of trajectories; check the "
-            f"units of the film, which shows up to {np.abs(film.value).max():.3g} and lasts {film.time[-1]:.3g}, and "
-            "those of the body"
+            f"a trajectory over the film takes {float(f'{usual:.1g}'):,.0f} steps, and a fit needs thousands of "
+            f"trajectories; check the units of the film, which shows up to {np.abs(film.value).max():.3g} and lasts "
+            f"{film.time[-1]:.3g}, and those of the body"
         )
 
 

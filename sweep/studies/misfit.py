@@ -109,12 +109,14 @@ class Problem:
         """Return the free parameters at places of shape (cells, free), by name."""
         return {name: np.ascontiguousarray(each) for name, each in zip(self.free, self.values(places).T, strict=True)}
 
-    def length(self, places: Array) -> Array:
-        """Return the number of steps to the end of the film, shape (cells,) or less: of bodies that can be."""
+    def steps(self, places: Array) -> Array:
+        """Return the automatic step of each trajectory, shape (cells,): infinite for a body that cannot be."""
         model, columns = self.config.equations, self.columns(places)
-        possible = ~model.impossible(columns)
-        columns = {name: values[possible] for name, values in columns.items()}
-        return np.asarray(self.film.time[-1] / automatic_step(PLAIN, model, columns)[0])
+        found, possible = np.full(len(places), np.inf), np.flatnonzero(~model.impossible(columns))
+        if len(possible):
+            columns = {name: values[possible] for name, values in columns.items()}
+            found[possible] = automatic_step(PLAIN, model, columns)[0]
+        return found
 
     def curves(self, places: Array, times: Array, steps: Array | None = None) -> Array:
         """Return what a film of the trajectories at `places` would show, shape (cells, times); NaN for lost ones.
@@ -163,11 +165,7 @@ class Problem:
         keys = [tuple(np.round(each[0] / _STEADY).tolist()) for each in places]
         new = {key: each[0] for key, each in zip(keys, places, strict=True) if np.isinf(self._steps.get(key, np.inf))}
         if new:  # together, since one alone takes as long
-            model, columns = self.config.equations, self.columns(np.stack([*new.values()]))
-            possible = np.flatnonzero(~model.impossible(columns))
-            columns, steps = {name: values[possible] for name, values in columns.items()}, np.full(len(new), np.inf)
-            steps[possible] = automatic_step(PLAIN, model, columns)[0] if len(possible) else steps[possible]
-            self._steps |= zip(new, steps.tolist(), strict=True)
+            self._steps |= zip(new, self.steps(np.stack([*new.values()])).tolist(), strict=True)
         return [self._steps[key] for key in keys]
 
 
