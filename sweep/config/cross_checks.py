@@ -250,7 +250,7 @@ def _at(values: Mapping[str, float], names: Iterable[str]) -> str:
 
 def _reasons(config: Config) -> list[Reason]:
     """Collect the reasons why bodies are impossible or cannot stand; only the first reason of a cell counts."""
-    if not config.of_rattlebacks or not {"offset", *INERTIA} & {*config.parameters, *config.cases}:
+    if not config.of_rattlebacks:
         return []
     grid, surface = config.grid, SURFACES[config.surface]
     counts, first, seen = Counter[str](), dict[str, dict[str, float]](), 0

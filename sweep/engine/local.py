@@ -15,7 +15,7 @@ from sweep.engine.misfits import misfits
 from sweep.engine.plan import plan
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
-from sweep.kernels.status import SETTLED
+from sweep.kernels.status import IMPOSSIBLE, SETTLED
 from sweep.prediction import predict
 from sweep.results.provenance import this_cpu
 from sweep.results.store import Running, Store
@@ -96,7 +96,7 @@ def split(grid: Grid, tiles: Sequence[Tile], todo: Sequence[int], cells: int, mo
 def _evaluate(config: Config, grid: Grid) -> dict[str, Array]:
     """Return the results of a model that is not simulated."""
     arrays = predict(config.tier, grid, config.measure).variables
-    arrays["status"] = np.full(grid.size, SETTLED)
+    arrays["status"] = np.where(config.tier.impossible(grid.columns()), IMPOSSIBLE, SETTLED)
     if "reversals" in config.measure:
         arrays["reversals"] = arrays[config.tier.counts]
     return arrays

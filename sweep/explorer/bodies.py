@@ -98,7 +98,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     columns = {name: np.full(taken[0].size, value) for name, value in fixed.items()}
     columns |= {name: values.ravel() for name, values in zip(axes, taken, strict=True)}
     place = np.arange(taken[0].size).reshape(shape)
-    possible = ~setup.config.equations.impossible(columns)
+    possible = ~setup.config.tier.impossible(columns)
     status = np.where(possible, SETTLED, IMPOSSIBLE)
     found, simulated = np.zeros(status.shape, "int16"), np.zeros(status.shape, bool)
 

@@ -111,6 +111,9 @@ class Tier:
     """Parameters that must not be zero, although `sweep.parameters` allows it."""
     counts: str = "reversals"
     """The variable that its number of reversals is: for a tier that is not simulated, one of its predictions."""
+    impossible: Callable[[Columns], Array] = lambda columns: zeros(columns).astype(bool)
+    """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
+    function is called for such a body."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,9 +146,6 @@ class Model(Tier):
     tilt: Callable[..., Any] = nothing
     """Inline, (states) -> sin² of the angle by which the body is tilted from upright spin.  The variables of a model
     with this function end at a right angle, where the body has toppled; by default there is no such limit."""
-    impossible: Callable[[Columns], Array] = lambda columns: zeros(columns).astype(bool)
-    """(columns) -> whether there is no such body, or it does not stand upright at rest, shape (cells,).  No other
-    function is called for such a body."""
 
     # How fast it moves, rocks and decays: steps, the average of the spin, and predictions follow from it.
     slower_period: Callable[[Columns], Array] = never_rocks

@@ -11,7 +11,7 @@ from sweep.explorer import bodies, state
 from sweep.explorer.bodies import COUNT
 from sweep.explorer.setup import Setup, usable
 from sweep.explorer.slices import Source
-from sweep.kernels.status import TOPPLED
+from sweep.kernels.status import IMPOSSIBLE
 
 RUN: dict[str, Any] = {
     "body": {"b": [0.5, 2.0, 3.0, 4.0, 5.0]}, "friction": {"mu": [30, 50, 70, 90, 110]}, "start": {"n0": 0.05},
@@ -35,7 +35,7 @@ def test_counts_are_foreseen_and_then_simulated() -> None:
     for name, of_run in ((COUNT, "reversals"), ("status", "status")):
         simulated = sweep.run(other)[of_run].transpose(*last.dataset[name].dims)
         np.testing.assert_array_equal(last.dataset[name], simulated, name)
-    assert (last.dataset["status"].sel(b=0.5) == TOPPLED).all()
+    assert (last.dataset["status"].sel(b=0.5) == IMPOSSIBLE).all()
     assert [each.whole for each in found] == [*[False] * (len(found) - 1), True]
     assert fine.dataset[COUNT].attrs["long_name"] == "spin reversals, foreseen, δ = 0.05 rad"
     assert last.dataset[COUNT].attrs["long_name"] == "spin reversals, simulated, δ = 0.05 rad"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sweep.models.general.validity import impossible
 from sweep.models.model import COUNT, FORMULAS, Array, Columns, Tier
 from sweep.models.theory.coefficients import coefficients
 
@@ -13,12 +14,12 @@ def critical_spins(columns: Columns) -> tuple[Array, Array]:
 
     n_c1+ = m1/k1 and n_c1- = -m4/k4 for k1 > 0; the two swap for k1 < 0 (δ < 0).  A reversal needs
     twice that spin, n_c2± = 2 n_c1±.  NaN where no spin is critical: where nothing couples spin and
-    rattle (δ = 0 or a = b), and without friction.
+    rattle (δ = 0 or a = b), without friction, and for a body that cannot stand.
     """
     k = coefficients(columns)
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = k.m1 / k.k1, -k.m4 / k.k4
-    exists = np.isfinite(first) & np.isfinite(second)
+    exists = np.isfinite(first) & np.isfinite(second) & ~impossible(columns)
     rate = np.sqrt(columns["c"])
     upper = np.where(exists, np.maximum(first, second) / rate, np.nan)
     lower = np.where(exists, np.minimum(first, second) / rate, np.nan)
@@ -60,4 +61,5 @@ MODEL = Tier(
     parameters=("a", "b", "c", "delta", "mu", "n0"),
     offers=frozenset({COUNT, FORMULAS}),
     counts="reversals_predicted",
+    impossible=impossible,
 )

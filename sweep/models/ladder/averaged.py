@@ -18,6 +18,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.general.rigid_body import slower_period
+from sweep.models.general.validity import impossible
 from sweep.models.model import COUNT, ENERGY, FORMULAS, LINEAR, SPIN, Array, Columns, Model
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 
@@ -63,6 +64,7 @@ MODEL = Model(
     offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,
+    impossible=impossible,
     slower_period=slower_period,
     upright=lambda spin: (0.0, 0.0, spin),
     rhs=rhs,

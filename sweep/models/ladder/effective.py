@@ -14,6 +14,7 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.models.general.rigid_body import slower_period
+from sweep.models.general.validity import impossible
 from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple, named
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.ripple import FORM, ripple_of_states
@@ -92,6 +93,7 @@ MODEL = Model(
     offers=frozenset({COUNT, SPIN, FORMULAS, LINEAR}),
     constants=Constants,
     start=start,
+    impossible=impossible,
     slower_period=slower_period,
     upright=lambda spin: (0.0, 0.0, 0.0, 0.0, spin),
     rhs=rhs,

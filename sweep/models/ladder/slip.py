@@ -155,5 +155,4 @@ MODEL = replace(
     _PAPER,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
     offers=_PAPER.offers | {FORMULAS},
-    impossible=Model.impossible,
 )

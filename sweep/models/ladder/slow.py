@@ -17,4 +17,5 @@ MODEL = Tier(
     positive=frozenset({"mu"}),
     offers=frozenset({COUNT, FORMULAS}),
     counts="reversals_foreseen",
+    impossible=slip.MODEL.impossible,
 )

@@ -74,7 +74,7 @@ class Rattle:
         readings = np.linalg.inv(pairs)[:, :2]
         amplitudes = (readings @ states[list(RATTLE[:4])].T[..., None])[..., 0]
         upright = -inertia * spin
-        unit, turn = _unit_energies_and_turns(form, modes, upright, constants)
+        unit, turn = _unit_energies_and_turns(form, modes, upright, constants, sound)
         slopes = turn / (unit * inertia[:, None])
         return cls(sound, rates, modes, readings, amplitudes, unit, slopes, upright, form, constants)
 
@@ -132,7 +132,7 @@ class Rattle:
 def slow_rates(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array, Array]:
     """`rates`, `slopes` and `sound` of `Rattle` at a spin, without a rattle."""
     rates, modes, sound = _rocking(form, constants, spin)
-    unit, turn = _unit_energies_and_turns(form, modes, -constants.J33 * spin, constants)
+    unit, turn = _unit_energies_and_turns(form, modes, -constants.J33 * spin, constants, sound)
     return rates, turn / (unit * constants.J33[:, None]), sound
 
 
@@ -187,15 +187,21 @@ def _turning(form: StiffForm, modes: Array, upright: Array, constants: Any) -> A
     return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * _SMALL**2), -1, 0))
 
 
-def _unit_energies_and_turns(form: StiffForm, modes: Array, upright: Array, constants: Any) -> tuple[Array, Array]:
-    """2 E / J33 and M3' of each mode at z = 1, averaged over a period, each of shape (cells, 2)."""
+def _unit_energies_and_turns(
+    form: StiffForm, modes: Array, upright: Array, constants: Any, sound: Array
+) -> tuple[Array, Array]:
+    """2 E / J33 and M3' of each mode at z = 1, averaged over a period, each of shape (cells, 2).
+
+    It clears `sound` where fast spin makes the energy of a mode negative, and takes 1 for that.
+    """
     energies = turns = np.zeros((modes.shape[2], len(upright)))
     for part in (modes.real, modes.imag):
         states = np.insert(np.moveaxis(part, 0, -1) * _SMALL, 4, upright, axis=0)
         _, rattle, inertia = form.model.energy(states, constants)
         energies = energies + 4 * rattle / inertia / _SMALL**2
         turns = turns + 2 * form.slow(*states, constants)[0][4] / _SMALL**2
-    return energies.T, turns.T
+    sound &= (energies > 0).all(axis=0)
+    return np.where(energies > 0, energies, 1.0).T, turns.T
 
 
 def _form(matrix: Array, amplitudes: Array) -> Array:
