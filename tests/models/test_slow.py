@@ -62,6 +62,8 @@ def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
           "y0": -0.20595}, "one mode must not excite the other in steps that are longer than their beat"),
         ({"a": 6.58157, "b": 6.54843, "c": 1.60573, "delta": -0.11106, "mu": 2.1437, "n0": 0.06486, "x0": -0.30049,
           "y0": -0.26185}, "friction alone couples modes whose frequencies hardly differ"),
+        ({"b": 8.6, "mu": 104, "n0": 0.1}, "one mode alone does not beat, though it changes its own frequency"),
+        ({"b": 3.6, "mu": 88, "n0": 0.02}, "in the last, long step the decaying mode still turns the spin"),
     ],
 )  # fmt: skip
 def test_counts_of_hard_cells(given: dict[str, float], what: str) -> None:
@@ -88,6 +90,14 @@ def test_bodies_without_two_rocking_modes_are_not_sure() -> None:
     found = slow.foresee(slip.MODEL, {name: np.broadcast_to(values, 3).copy() for name, values in some.items()})
     assert not found.sure.any()
     assert (found.reversals[:2] == 0).all()
+
+
+def test_a_mode_that_harmonics_of_the_other_drive_is_not_sure() -> None:
+    """Its frequency is five times that of the other: the full model reverses ten times."""
+    body = {"a": 9.177403, "b": 0.899823, "c": 0.575785, "delta": -0.189866, "mu": 46.871297}
+    found = slow.foresee(slip.MODEL, columns(**body, n0=-0.061097, x0=-0.502401, y0=-0.021362))
+    assert found.reversals < 10
+    assert not found.sure
 
 
 def test_a_start_by_angles_and_rates_is_foreseen() -> None:

@@ -11,7 +11,8 @@ where Y has no part along the rocking modes, w is cubic in a and its conjugate, 
 up to terms of order |a|⁵ and |a|⁶.  With the Jacobian A of the full model at the spin n, A (1 + Y) = (1 + Y) C, so that
 C has the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2): their
 harmonics that do not turn with a mode, divided by their frequencies.  Unlike modes at n, all these are smooth functions
-of n where the two frequencies meet.  They are computed at five spins, with polynomials between them.
+of n where the two frequencies meet.  C and H are computed at five spins, T and Q at three, with
+polynomials between them.
 
 The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory
 reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
@@ -27,25 +28,42 @@ from sweep.models.model import Model
 from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory.linear import NODES
 
-# Phases of each mode; the equations are odd, so the second mode needs only half a turn.
-_PHASES = 8
-_TURN = np.exp(2j * np.pi * np.arange(_PHASES) / _PHASES)
-
 # Products of a_1, a_2, a_1*, a_2*, by their exponents.
 SECOND = np.array([(2, 0, 0, 0), (1, 1, 0, 0), (0, 2, 0, 0)])
 THIRD = np.array([(2, 0, 1, 0), (1, 1, 0, 1), (1, 1, 1, 0), (0, 2, 0, 1), (2, 0, 0, 1), (0, 2, 1, 0),
                   (3, 0, 0, 0), (2, 1, 0, 0), (1, 2, 0, 0), (0, 3, 0, 0)])  # fmt: skip
-TERMS = 25
-"""C in rows, H_11, H_22, H_12, T in rows, and Q: of |a_1|⁴, |a_1 a_2|², |a_2|⁴, |a_1|² a_1 a_2*, |a_2|² a_1 a_2*,
-(a_1 a_2*)²."""
 RESONANT = 6
 """The first ones of `THIRD` turn as a_1 or a_2 do where the frequencies meet: they are the terms of T."""
+
+LOWEST, HIGHER, TERMS = 7, 19, 25
+"""The coefficients: C in rows, H_11, H_22 and H_12; then T in rows; then Q, of |a_1|⁴, |a_1 a_2|², |a_2|⁴,
+|a_1|² a_1 a_2*, |a_2|² a_1 a_2* and (a_1 a_2*)²."""
+
+# The spins, among the five `NODES`, at which T and Q are found: with five, the same share of counts is right.
+_THREE = 3
 
 # Harmonics (of the first phase, of the second) of the products of third order, and of the spin's change.
 _ODD = np.array([(1, 0), (1, 0), (0, 1), (0, 1), (2, -1), (-1, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
 _EVEN = np.array([(0, 0), (1, -1), (2, -2), (2, 0), (1, 1), (0, 2)])
-_PLACES = np.stack(np.meshgrid(np.arange(_PHASES), np.arange(_PHASES), indexing="ij"), axis=-1)
-_ODD_TURNS, _EVEN_TURNS = (_TURN[-(_PLACES @ each.T) % _PHASES] for each in (_ODD, _EVEN))
+
+# Phases of both modes on a torus, in eighths of a turn: of the second, half a turn is enough, because the equations are
+# odd.  The first points are those for the first mode alone, and from the last of these on, those for the second.
+_PHASES, _FIRST, _SECOND = 8, 4, 7
+_ALONE = [(3, 0), (2, 0), (1, 0), (0, 0), (0, 1), (0, 2), (0, 3)]
+_PLACES = np.array([*_ALONE, *sorted({*np.ndindex(_PHASES, _PHASES // 2)} - {*_ALONE})])
+_POINTS = len(_PLACES)
+
+
+def _turns(harmonics: np.ndarray) -> np.ndarray:
+    """exp(i phase) of harmonics at the points, shape (points, harmonics)."""
+    return np.exp(2j * np.pi / _PHASES * (_PLACES @ harmonics.T))
+
+
+_ALL = np.concatenate([np.eye(2, 4, dtype=int), THIRD, SECOND])
+_DEGREES = _ALL[:, :2] + _ALL[:, 2:]
+_WAVES = _turns(_ALL[:, :2] - _ALL[:, 2:]).T.copy()
+_COS, _SIN = _WAVES.real.copy(), _WAVES.imag.copy()
+_ODD_TURNS, _EVEN_TURNS = (_turns(-each).view(float) for each in (_ODD, _EVEN))
 
 # Amplitudes for the ripple, for w, for T and Q, and for κ, in units of the fastest spin within reach.
 _TINY, _SMALL, _USUAL, _LARGE = 1e-4, 0.1, 0.3, 0.9
@@ -53,8 +71,8 @@ _TINY, _SMALL, _USUAL, _LARGE = 1e-4, 0.1, 0.3, 0.9
 # The least difference of frequencies by which a term of w is divided, relative to a frequency.
 _NEAR = 0.02
 
-# The iterations for Y converge as powers of the spin in units of a frequency.
-_ITERATIONS = 16
+# The iterations for Y converge as powers of the spin in units of a frequency: until they change it by less than this.
+_ITERATIONS, _CLOSE = 16, 1e-13
 
 
 def _rows(products: np.ndarray) -> np.ndarray:
@@ -75,6 +93,7 @@ def _rows(products: np.ndarray) -> np.ndarray:
 
 _OF_SECOND, _OF_THIRD = _rows(SECOND), _rows(THIRD)
 _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
+_FIT_OF_THREE = np.linalg.inv(NODES[:_THREE, None] ** np.arange(_THREE))
 _SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ _FIT
 """Takes values at `NODES` to the derivative there of the polynomial through them."""
 
@@ -85,6 +104,23 @@ def _clear(matrix):
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             matrix[i, j] = 0.0
+
+
+@called
+def _add(size, m, first, last, series):
+    """Add the real part of `size` times a product of unit amplitudes to a series over points."""
+    for i in range(first, last):
+        series[i] += size.real * _COS[m, i] - size.imag * _SIN[m, i]
+
+
+@called
+def _resolve(series, turns, first, last, sums):
+    """Sum a series over points times `turns`, of shape (points, 2 harmonics): real and imaginary parts."""
+    for m in range(turns.shape[1]):
+        sums[m] = 0.0
+    for i in range(first, last):
+        for m in range(turns.shape[1]):
+            sums[m] += series[i] * turns[i, m]
 
 
 @called
@@ -138,9 +174,12 @@ def _derivation(rows, C, D):
 @called
 def _follow_modes(A, Y, C):
     """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest."""
-    M, x = np.empty((4, 4), A.dtype), np.empty(4, A.dtype)
+    M, x, left = np.empty((4, 4), A.dtype), np.empty(4, A.dtype), 1.0
     _clear(Y)
     for _ in range(_ITERATIONS):
+        if left < _CLOSE:
+            break
+        left = 0.0
         _product(A[:2, 2:], Y, C)
         for j in range(2):
             C[0, j], C[1, j] = C[0, j] + A[0, j], C[1, j] + A[1, j]
@@ -150,6 +189,7 @@ def _follow_modes(A, Y, C):
                 x[i] = Y[i, 1 - j] * C[1 - j, j] - A[i + 2, j]
             _solve(M, x, 0.0)
             for i in range(4):
+                left += abs(x[i].real - Y[i, j].real) + abs(x[i].imag - Y[i, j].imag)
                 Y[i, j] = x[i]
 
 
@@ -217,8 +257,8 @@ def _fill(A, D, M):
 def make_exchange(model: Model):
     """Compiled (p, E, E⁻¹, reach, table, bent) -> None, which writes the coefficients of a body, and `begin`.
 
-    `table`, of shape (5, TERMS), gets those of the polynomials in n / `reach` of C, H_11, H_22, H_12, T and Q; and
-    `bent` the two κ.
+    `table`, of shape (5, TERMS), gets those of the polynomials in n / `reach`, of fourth degree for C and H and of
+    second degree for T and Q; and `bent` the two κ.
     """
     rhs = model.rhs
 
@@ -240,39 +280,35 @@ def make_exchange(model: Model):
 
         `shape` is E (1 + Y + w) by states: of shape (6, 2) without w.  As many modes are resolved as `odd` has rows.
         """
+        first, last = 0 if sizes[0] > 0.0 else _FIRST - 1, _SECOND if sizes[1] > 0.0 else _FIRST
+        last = last if sizes[0] == 0.0 or sizes[1] == 0.0 else _POINTS
+        x, slopes = np.zeros((7, _POINTS)), np.empty((7, _POINTS))
+        powers = np.ones((4, 2))
+        for k in range(3):
+            for m in range(2):
+                powers[k + 1, m] = powers[k, m] * sizes[m]
+        for m in range(shape.shape[1]):
+            size = 2.0 * powers[_DEGREES[m, 0], 0] * powers[_DEGREES[m, 1], 1]
+            for k, state in enumerate(RATTLE):
+                _add(size * shape[k, m], m, first, last, x[state])
+        for m in range(3):
+            _add(2.0 * powers[2 - m, 0] * powers[m, 1] * q[m], 2 + len(THIRD) + m, first, last, x[4])
+        for i in range(first, last):
+            rates, _ = rhs((x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] - n, x[5, i], x[6, i]), p)
+            slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], slopes[4, i], slopes[5, i], slopes[6, i] = rates
+        share, sums = 1.0 / (last - first), np.zeros(2 * len(THIRD))
         _clear(odd)
         for m in range(len(even)):
             even[m] = 0.0
-        both = sizes[0] > 0.0 and sizes[1] > 0.0
-        first = _PHASES if both else _PHASES // 2 if sizes[0] > 0.0 else 1
-        second = _PHASES // 2 if sizes[1] > 0.0 else 1
-        share = 1.0 / (first * second)
-        powers, products = np.ones((4, 4), inverse.dtype), np.empty(2 + len(THIRD), inverse.dtype)
-        x = np.empty(6)
-        for i in range(first):
-            for j in range(second):
-                products[0], products[1] = sizes[0] * _TURN[i], sizes[1] * _TURN[j]
-                for k in range(3):
-                    for m in range(2):
-                        powers[k + 1, m] = powers[k, m] * products[m]
-                        powers[k + 1, m + 2] = np.conj(powers[k + 1, m])
-                for m in range(shape.shape[1] - 2):
-                    product = powers[THIRD[m, 0], 0] * powers[THIRD[m, 1], 1]
-                    products[m + 2] = product * powers[THIRD[m, 2], 2] * powers[THIRD[m, 3], 3]
-                for k in range(6):
-                    x[k] = 0.0
-                    for m in range(shape.shape[1]):
-                        x[k] += 2.0 * (shape[k, m] * products[m]).real
-                ripple = q[0] * powers[2, 0] + q[1] * products[0] * products[1] + q[2] * powers[2, 1]
-                slopes, _ = rhs((x[0], x[1], x[2], x[3], 2.0 * ripple.real - n, x[4], x[5]), p)
-                for m in range(len(even)):
-                    even[m] += share * slopes[4] * _EVEN_TURNS[i, j, m]
+        _resolve(slopes[4], _EVEN_TURNS, first, last, sums)
+        for m in range(len(even)):
+            even[m] = share * (sums[2 * m] + 1j * sums[2 * m + 1])
+        if len(odd):
+            for j, state in enumerate(RATTLE):
+                _resolve(slopes[state], _ODD_TURNS, first, last, sums)
                 for k in range(len(odd)):
-                    slope = 0.0j
-                    for m, state in enumerate(RATTLE):
-                        slope += inverse[k, m] * slopes[state]
                     for m in range(odd.shape[1]):
-                        odd[k, m] += share * slope * _ODD_TURNS[i, j, m]
+                        odd[k, m] += share * inverse[k, j] * (sums[2 * m] + 1j * sums[2 * m + 1])
 
     @called
     def small_shape(E, Y, shape):
@@ -322,25 +358,30 @@ def make_exchange(model: Model):
         sums[23] = beats - sums[22]
 
     @called
-    def terms(n, reach, p, E, inverse, A, C, Y, slope, rest, bent, sums):
-        """All coefficients at one spin, and the κ at rest; `slope` is the derivative of Y by n."""
-        small, linear, shape = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
-        q, w, found = np.zeros(3, E.dtype), np.empty((6, len(THIRD)), E.dtype), np.empty((6, len(THIRD)), E.dtype)
-        none, even, large = np.empty((0, len(THIRD)), E.dtype), np.empty(len(_EVEN), E.dtype), np.empty(TERMS, E.dtype)
-        squares = np.zeros((2, 2))
+    def linear_terms(n, reach, p, E, inverse, Y, C, small, q, sums):
+        """C, H and the ripple at one spin; `small` gets E (1 + Y)."""
+        none, even, tiny = np.empty((0, len(THIRD)), E.dtype), np.empty(len(_EVEN), E.dtype), _TINY * reach
         small_shape(E, Y, small)
         for i in range(2):
             for j in range(2):
-                sums[2 * i + j] = linear[i, j] = C[i, j]
-            for k in range(6):
-                shape[k, i] = small[k, i]
-            for k in range(4):  # (1 + Y) C
-                linear[k + 2, i] = Y[k, 0] * C[0, i] + Y[k, 1] * C[1, i]
-        tiny = _TINY * reach
+                sums[2 * i + j] = C[i, j]
         harmonics((tiny, 0.0), n, p, small, inverse, q, none, even)
         sums[4] = -even[0] / tiny**2
         ripple(tiny, n, p, small, inverse, C, q, even)
         sums[5], sums[6] = -even[0] / tiny**2 - sums[4], -even[1] / tiny**2
+
+    @called
+    def higher_terms(n, reach, p, E, inverse, A, C, Y, slope, small, q, rest, bent, sums):
+        """T and Q at one spin, and the κ at rest; `slope` is the derivative of Y by n."""
+        linear, shape, squares = np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype), np.zeros((2, 2))
+        w, found, large = np.empty((6, len(THIRD)), E.dtype), np.empty((6, len(THIRD)), E.dtype), sums.copy()
+        for i in range(2):
+            for j in range(2):
+                linear[i, j] = C[i, j]
+            for k in range(6):
+                shape[k, i] = small[k, i]
+            for k in range(4):  # (1 + Y) C
+                linear[k + 2, i] = Y[k, 0] * C[0, i] + Y[k, 1] * C[1, i]
         cubes(_SMALL * reach, n, p, small, inverse, q, linear, found, sums)
         for m in range(RESONANT):  # Y depends on the spin, which changes
             for i in range(2):
@@ -354,17 +395,15 @@ def make_exchange(model: Model):
         cubes(_USUAL * reach, n, p, shape, inverse, q, linear, found[:2], sums)
         for i in range(2):
             for m in range(RESONANT):
-                sums[7 + i * RESONANT + m] = found[i, m]
+                sums[LOWEST + i * RESONANT + m] = found[i, m]
         if rest:
-            for k in range(7):
-                large[k] = sums[k]
             cubes(_LARGE * reach, n, p, shape, inverse, q, linear, found[:2], large)
             for i in range(2):
                 for m in range(RESONANT):
-                    large[7 + i * RESONANT + m] = found[i, m]
-            for k in range(7, TERMS):
-                squares[0, k // 19] += abs(sums[k]) ** 2
-                squares[1, k // 19] += abs(large[k]) ** 2
+                    large[LOWEST + i * RESONANT + m] = found[i, m]
+            for k in range(LOWEST, TERMS):
+                squares[0, k // HIGHER] += abs(sums[k]) ** 2
+                squares[1, k // HIGHER] += abs(large[k]) ** 2
             for k in range(2):
                 ratio = np.sqrt(squares[0, k] / squares[1, k])
                 bent[k] = (ratio - 1.0) / (reach * reach * (_LARGE**2 - ratio * _USUAL**2))
@@ -373,22 +412,30 @@ def make_exchange(model: Model):
     def exchange(p, E, inverse, reach, table, bent):
         A, C, Y = np.empty((5, 6, 6), E.dtype), np.empty((5, 2, 2), E.dtype), np.empty((5, 4, 2), E.dtype)
         sums, slope = np.empty((5, TERMS), E.dtype), np.empty((4, 2), E.dtype)
+        small, q = np.empty((6, 2), E.dtype), np.zeros(3, E.dtype)
         for k in range(5):
             jacobian(NODES[k] * reach, p, E, inverse, A[k])
             _follow_modes(A[k], Y[k], C[k])
         for k in range(5):
-            _clear(slope)
-            for j in range(5):
-                for i in range(4):
-                    for m in range(2):
-                        slope[i, m] += _SLOPE[k, j] / reach * Y[j, i, m]
-            terms(NODES[k] * reach, reach, p, E, inverse, A[k], C[k], Y[k], slope, k == 0, bent, sums[k])
+            n = NODES[k] * reach
+            linear_terms(n, reach, p, E, inverse, Y[k], C[k], small, q, sums[k])
+            if k < _THREE:
+                _clear(slope)
+                for j in range(5):
+                    for i in range(4):
+                        for m in range(2):
+                            slope[i, m] += _SLOPE[k, j] / reach * Y[j, i, m]
+                higher_terms(n, reach, p, E, inverse, A[k], C[k], Y[k], slope, small, q, k == 0, bent, sums[k])
         _clear(table)
-        for m in range(TERMS):
-            straight = 1.0 + bent[m // 19] * (_USUAL * reach) ** 2 if m >= 7 else 1.0
+        for m in range(LOWEST):
             for k in range(5):
                 for j in range(5):
-                    table[k, m] += straight * _FIT[k, j] * sums[j, m]
+                    table[k, m] += _FIT[k, j] * sums[j, m]
+        for m in range(LOWEST, TERMS):
+            straight = 1.0 + bent[m // HIGHER] * (_USUAL * reach) ** 2
+            for k in range(_THREE):
+                for j in range(_THREE):
+                    table[k, m] += straight * _FIT_OF_THREE[k, j] * sums[j, m]
 
     @called
     def begin(x, n, reach, p, E, inverse):

@@ -10,10 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import called, inline
+from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS
 
-# A step turns the spin by no more than this share of what a mode can, and advances the beat by no more than this phase
-# where T changes the rates by more than a share `_ACTS` of the frequency of the beat.
-_TURN, _BEAT, _ACTS = 0.02, 1.0, 0.02
+# A step turns the spin by no more than this share of what a mode can, and by so little that the rates, which change by
+# |H| with the spin, change no amplitude by more than this factor (in logarithms) against the middle of the step.
+_TURN, _CHANGE = 0.04, 0.3
+
+# The beat advances by no more than this phase in a step where its part in T changes the rates by more than a share
+# `_ACTS` of its frequency.
+_BEAT, _ACTS = 1.0, 0.1
 
 # If the beat advances by more than this phase in a step, each mode keeps its own amplitude while the modes change with
 # the spin. To resolve the old modes into the new ones would excite one by the other, which the motion does not do.
@@ -44,11 +49,11 @@ def _quotient(a, b):
 @called
 def _at(table, x, sums):
     """The coefficients at a spin."""
-    for k in range(len(sums)):
-        sums[k] = table[4, k]
-    for j in range(3, -1, -1):
-        for k in range(len(sums)):
-            sums[k] = sums[k] * x + table[j, k]
+    t, s = table.view(np.float64), sums.view(np.float64)  # real and imaginary parts
+    for k in range(2 * LOWEST):
+        s[k] = (((t[4, k] * x + t[3, k]) * x + t[2, k]) * x + t[1, k]) * x + t[0, k]
+    for k in range(2 * LOWEST, 2 * TERMS):
+        s[k] = (t[2, k] * x + t[1, k]) * x + t[0, k]
 
 
 @inline
@@ -140,7 +145,7 @@ def follow(a1, a2, n, table, bent, reach, size):
     """
     sums = np.empty(table.shape[1], table.dtype)
     strong = 0.0
-    for k in range(7, 19):
+    for k in range(LOWEST, HIGHER):
         strong += 0.5 * _square(table[0, k])
     strong = size * np.sqrt(strong)
     far = table[0, 3].imag > 2.0 * table[0, 0].imag
@@ -165,7 +170,8 @@ def follow(a1, a2, n, table, bent, reach, size):
         way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(abs(g1), abs(g2), _TINY))
         step = min(_until(way, turn1, r1), _until(way, turn2, r2))
         step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
-        acts = strong * (f1 + f2)
+        step = min(step, _CHANGE / (max(abs(g1), abs(g2)) * min(way, left) + _TINY))
+        acts = 2.0 * strong * np.sqrt(f1 * f2)
         if acts > _ACTS * apart:
             step = min(step, _BEAT / (apart + acts))
         keep = 0.0 if apart * step > _APART_STEP else 1.0
