@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from sweep.studies.predictions import predict
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "animate", "boundaries", "critical", "explore", "fit", "indices",
+    "Config", "ConfigError", "StoreError", "animate", "boundaries", "changes", "critical", "explore", "fit", "indices",
     "load_config", "open", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
@@ -70,7 +70,7 @@ def _refuse_arguments(config: Config) -> None:
 
     if not config.origin:
         return
-    verbs = run, boundaries, critical, trajectory, fit, indices
+    verbs = run, boundaries, changes, critical, trajectory, fit, indices
     arguments = {name for verb in verbs for name in signature(verb).parameters}
     if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
         message = f"parameter {wrong[0]!r} has the name of an argument of sweep.run or a similar function; rename it"
@@ -180,6 +180,48 @@ def boundaries(
     with _prepared(config, overrides, progress, reporter) as (checked, reporter):
         task = boundaries(checked, x, y, bracket, deviation)
         return run_study(task, output, fresh=fresh, reporter=reporter, client=client)
+
+
+def changes(
+    config: ConfigLike,
+    *,
+    reversals: int = 1,
+    progress: bool | None = None,
+    reporter: Reporter | None = None,
+    **overrides: Any,
+) -> xr.Dataset:
+    """Find the smallest change of each parameter that gives a body more reversals, or fewer.
+
+    The slow equations foresee where the count changes, from half of each parameter's value to twice as much, one
+    parameter at a time. Simulations of the full model bracket the place.
+
+    Parameters
+    ----------
+    config : one body and one start, otherwise as for `run`; with viscous friction and without couples
+    reversals : how many reversals more, at least; negative for fewer
+    progress, reporter, overrides : as for `run`
+
+    Returns
+    -------
+    Dataset over the parameters: the relative `change`, the simulated values at which the count is still as it is and at
+    which it has changed, a thousandth apart, and the count there. NaN where no such value is foreseen, or where
+    simulations do not confirm it. The attribute `reversals` is the count of the body as it is.
+
+    Raises
+    ------
+    ConfigError
+        if the configuration has more than one cell, an undecided count, or a model without foreseen counts.
+
+    Examples
+    --------
+    >>> found = sweep.changes({"body": {"b": 3}, "friction": {"mu": 60}, "start": {"n0": 0.05}})
+    >>> found.attrs["reversals"], found.reversals.sel(parameter="mu").item()
+    (3, 4)
+    """
+    from sweep.studies.changes import changes
+
+    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+        return changes(checked, reversals, reporter)
 
 
 def critical(

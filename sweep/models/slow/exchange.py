@@ -56,7 +56,7 @@ _POINTS = len(_PLACES)
 
 def _turns(harmonics: np.ndarray) -> np.ndarray:
     """exp(i phase) of harmonics at the points, shape (points, harmonics)."""
-    return np.exp(2j * np.pi / _PHASES * (_PLACES @ harmonics.T))
+    return np.asarray(np.exp(2j * np.pi / _PHASES * (_PLACES @ harmonics.T)))
 
 
 _ALL = np.concatenate([np.eye(2, 4, dtype=int), THIRD, SECOND])

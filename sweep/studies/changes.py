@@ -1,0 +1,135 @@
+"""Finds the smallest change of each parameter that gives another number of reversals.
+
+The slow equations foresee the counts over a range of each parameter in turn, which shows where to look. Simulations of
+the full model then bracket the place at which the count changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from sweep.config import Config, ConfigError
+from sweep.engine.reporter import Reporter
+from sweep.engine.run import run
+from sweep.faults import fault_of
+from sweep.grid import Array
+from sweep.models.model import MODES
+from sweep.prediction import foreseen
+from sweep.studies.search import measuring, require_certain
+
+# Each parameter is scanned from half of its value to twice as much, in steps of 0.7 %.
+_FACTOR, _PLACES = 2.0, 201
+
+# Cells that are simulated at once for a parameter, and the relative width of a bracket that is narrow enough. The first
+# ones reach a quarter farther than the foreseen place.
+_TOGETHER, _WIDTH, _FARTHER = 12, 1e-3, 1.25
+
+
+@dataclass
+class _Bracket:
+    """Two values of a parameter: with the count of the cell and, once it is found, with another one."""
+
+    near: float
+    far: float
+    count: int = -1
+    """The count at `far`; -1 until simulations have found another one."""
+
+    @property
+    def wide(self) -> bool:
+        return bool(abs(np.log(self.far / self.near)) > _WIDTH)
+
+    def places(self) -> Array:
+        """Values between the two, and the second."""
+        return np.asarray(self.near * (self.far / self.near) ** (np.arange(1, _TOGETHER + 1) / _TOGETHER))
+
+    def narrow(self, counts: Array, reach: Array) -> None:
+        """Keep the first part at whose end the count is one to `reach`."""
+        if reach.any():
+            first, ends = int(np.argmax(reach)), [self.near, *self.places()]
+            self.near, self.far, self.count = ends[first], ends[first + 1], int(counts[first])
+
+
+def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
+    """Arguments of `sweep.api.changes`."""
+    if not reversals:
+        raise fault_of("must not be 0; give 1 for one reversal more, -1 for one less", "reversals")
+    cell = _cell(config)
+    now = int(_counts(config, {name: np.array([value]) for name, value in cell.items()}, reporter)[0])
+    if now < 0:
+        raise ConfigError([config.fault((), "the count of this body is not decided; see `decided` of a run")])
+    brackets = _foreseen(config, cell, reversals)
+    while wide := {name: each.places() for name, each in brackets.items() if each.wide}:
+        columns = {name: np.tile(value, (len(wide), _TOGETHER)) for name, value in cell.items()}
+        for i, (name, places) in enumerate(wide.items()):
+            columns[name][i] = places
+        counts = _counts(config, {name: values.ravel() for name, values in columns.items()}, reporter)
+        for name, theirs in zip(wide, counts.reshape(len(wide), _TOGETHER), strict=True):
+            brackets[name].narrow(theirs, _reach(theirs, now, reversals))
+            if brackets[name].count < 0:
+                del brackets[name]
+    return _dataset(config, cell, now, brackets)
+
+
+def _cell(config: Config) -> dict[str, float]:
+    """Return the parameters of the only cell of a configuration; raise a `ConfigError` if there are more."""
+    require_certain(config)
+    if config.grid.size > 1:
+        name = next(name for name, values in {**config.axes, **config.cases}.items() if len(values) > 1)
+        raise ConfigError([config.fault(config.table[name].place, "has several values; give that of one body")])
+    if MODES not in config.equations.offers:
+        message = "has no foreseen counts; they need a body without couples, with viscous friction"
+        raise ConfigError([config.fault(("model",), message)])
+    return {name: float(column[0]) for name, column in config.grid.columns().items()}
+
+
+def _foreseen(config: Config, cell: Mapping[str, float], reversals: int) -> dict[str, _Bracket]:
+    """Return brackets, by parameter, that hold the nearest value at which the foreseen count has changed enough."""
+    names = [name for name, value in cell.items() if value]
+    factors = _FACTOR ** np.linspace(-1, 1, _PLACES)
+    columns = {name: np.full((len(names), _PLACES), value) for name, value in cell.items()}
+    for i, name in enumerate(names):
+        columns[name][i] *= factors
+    flat = {name: values.ravel() for name, values in columns.items()}
+    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"].reshape(len(names), _PLACES)
+    middle, brackets = _PLACES // 2, dict[str, _Bracket]()
+    for i, name in enumerate(names):
+        allowed = np.array([config.table[name].allows(value) for value in columns[name][i]])
+        reached = allowed & _reach(counts[i], counts[i, middle], reversals)
+        if reached.any():
+            nearest = np.abs(np.flatnonzero(reached) - middle).argmin()
+            factor = factors[np.flatnonzero(reached)[nearest]]
+            brackets[name] = _Bracket(cell[name], cell[name] * factor**_FARTHER)
+    return brackets
+
+
+def _reach(counts: Array, now: int, reversals: int) -> Array:
+    """Return which counts differ from `now` by as many reversals as asked for, or more, in the same sense."""
+    return np.asarray((counts - now) * np.sign(reversals) >= abs(reversals)) & (counts >= 0)
+
+
+def _counts(config: Config, columns: Mapping[str, Array], reporter: Reporter) -> Array:
+    """Simulate cells; the count of a cell that is not decided is -1."""
+    cases = {name: tuple(values.tolist()) for name, values in columns.items()}
+    found = run(replace(measuring(config), parameters={}, cases=cases, picture=()), reporter=reporter)
+    return np.where(found["decided"].values == 1, found["reversals"].values, -1)
+
+
+def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapping[str, _Bracket]) -> xr.Dataset:
+    """Return what was found for each parameter that can change; NaN, and the count as it is, where nothing was."""
+    names = [name for name, value in cell.items() if value]
+    nothing = _Bracket(np.nan, np.nan, now)
+    rows = [(cell[name], brackets.get(name, nothing)) for name in names]
+    columns = {
+        "value": ([value for value, _ in rows], "value of the parameter"),
+        "change": ([each.far / value - 1 for value, each in rows], "relative change that gives the other count"),
+        "unchanged_at": ([each.near for _, each in rows], "last simulated value with the count as it is"),
+        "changed_at": ([each.far for _, each in rows], "first simulated value with the other count"),
+        "reversals": ([each.count for _, each in rows], "spin reversals there, simulated"),
+    }
+    variables = {name: ("parameter", values, {"long_name": meaning}) for name, (values, meaning) in columns.items()}
+    attributes = {"title": f"{config.name}: changes of {now} reversals", "config": config.to_yaml(), "reversals": now}
+    return xr.Dataset(variables, {"parameter": names}, attributes)
