@@ -28,7 +28,7 @@ from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.model import MODES, Model, Tier
+from sweep.models.model import ENDING, Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.variants import PAPER_LAW, Physics
@@ -249,7 +249,7 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
         found["method"] = methods.AUTO if choice and not alone else methods.PLAIN
     if "t_end" not in said:
         found["t_end"] = _longest(schema.T_END, in_si)
-        if MODES in model.offers and integrator.stop_when_settled:
+        if ENDING in model.offers and integrator.stop_when_settled:
             found |= {"t_end": _longest(schema.LATER, in_si), "patience": integrator.patience or found["t_end"]}
     return Integrator(**{**dict(integrator), **found})
 

@@ -18,7 +18,7 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
-from sweep.models.model import MODES, Model
+from sweep.models.model import ENDING, Model
 from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
 
@@ -85,7 +85,7 @@ def too_early(cells: Cells, which: Array | bool = True) -> Array:
     was watched.
     """
     settled = which & (cells.status == SETTLED)
-    if MODES not in cells.kernel.model.offers or not settled.any():
+    if ENDING not in cells.kernel.model.offers or not settled.any():
         return np.zeros(len(settled), bool)
     table = cells.kernel.table(cells.images)
     left = endings(table, settled).reversals
@@ -110,7 +110,7 @@ def _stays(model: Model, kernel: Kernel, images: Array) -> Array:
 
 def _late(cells: Cells) -> Array:
     """Return which cells have reached their time limit and can be shown to have settled, shape (cells,)."""
-    known = MODES in cells.kernel.model.offers and "reversals" in cells.kernel.measure
+    known = ENDING in cells.kernel.model.offers and "reversals" in cells.kernel.measure
     return np.asarray((cells.status == TIME_LIMIT) & known)
 
 

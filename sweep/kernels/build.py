@@ -33,7 +33,7 @@ from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
 from sweep.kernels.samples import compiled_samples
 from sweep.models import find
-from sweep.models.model import MODES, Model
+from sweep.models.model import ENDING, Model
 from sweep.models.origin import Origin
 from sweep.models.stiff.final_spin import compiled_following
 from sweep.models.user import loading
@@ -47,7 +47,7 @@ KERNEL, IMAGES, ENDINGS, SAMPLES, PATH, APPROACH = "kernel", "images", "endings"
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
     IMAGES: lambda kernel: kernel.stepper.filling(),
-    ENDINGS: lambda kernel: (compiled_following(),) if MODES in kernel.model.offers else (),
+    ENDINGS: lambda kernel: (compiled_following(),) if ENDING in kernel.model.offers else (),
     SAMPLES: lambda kernel: (compiled_samples(kernel.model, "spin"),),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),

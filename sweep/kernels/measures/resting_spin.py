@@ -19,7 +19,7 @@ from sweep.kernels.layout import Table, constants_of
 from sweep.kernels.measures.decay import FORESEEN
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
-from sweep.models.model import MODES, Array, stack
+from sweep.models.model import ENDING, MODES, Array, stack
 from sweep.models.stiff.final_spin import Ending, ending
 from sweep.models.stiff.form import STATES
 from sweep.models.stiff.slip import form_of
@@ -53,7 +53,7 @@ def endings(table: Table, which: Array) -> Ending:
     """
     result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), FORESEEN[0] in table.layout
     model = table.layout.model
-    if model is None or MODES not in model.offers:
+    if model is None or ENDING not in model.offers:
         return result
     new = which & np.isfinite(table.columns(model.states)).all(axis=1)
     if keeps:

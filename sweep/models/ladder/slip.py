@@ -36,7 +36,7 @@ from sweep.models.general.common import VISCOUS, Variant, of_any_body, offers
 from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.laws import Law
 from sweep.models.general.rigid_body import about_centre, contact_on, energy_on, gyroscopic
-from sweep.models.model import FORMULAS, MODES, REVERSAL_TIME, Array, Columns, Model
+from sweep.models.model import ENDING, FORMULAS, MODES, REVERSAL_TIME, Array, Columns, Model
 from sweep.models.vectors import Vector
 
 STATES = ("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2")
@@ -115,8 +115,9 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         }
 
     linear = law.linear_to is None
-    # A couple slows the spin of a body that does not rattle; leaps and the slow equations do not allow for that.
-    modes = law == VISCOUS and not couples and not variant.skew
+    ending = (
+        law == VISCOUS and not variant.skew and all(each.linear and not each.needs_normal_force for each in couples)
+    )
     return Model(
         **of_any_body(variant),
         summary="full equations with slip friction (Takano 2011, Ldot … visf)",
@@ -124,7 +125,9 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=law.coupled is None)
         | ({REVERSAL_TIME} if law == VISCOUS else set())
-        | ({MODES} if modes else set()),
+        | ({ENDING} if ending else set())
+        # A couple slows the spin of a body that does not rattle; leaps do not allow for that.
+        | ({MODES} if ending and not couples else set()),
         constants=record,
         start=lambda columns: starts.slipping(columns, surface),
         fastest_decay=fastest_decay,

@@ -4,9 +4,9 @@ A mode of energy E_k = J33 e_k / 2 grows at the rate r_k of the linear theory an
 
     e_k' = 2 r_k(n) e_k,   n' = -Σ s_k(n) e_k,
 
-with r_k and s_k of the full model (`sweep.models.stiff.modes`) at five spins, and polynomials between them.  The
-neglected terms are of the order of `bending` times n² + Σ e_k, and grow where the two modes meet, as in nearly round
-bodies.
+with r_k and s_k of the full model (`sweep.models.stiff.modes`) at five spins, and polynomials between them.  A couple
+adds -d n to n'.  The neglected terms are of the order of `bending` times n² + Σ e_k, and grow where the two modes meet,
+as in nearly round bodies.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from sweep.jit import Cached, called, serial
 from sweep.models.model import Array, take
 from sweep.models.stiff.form import StiffForm
-from sweep.models.stiff.modes import Rattle, slow_rates
+from sweep.models.stiff.modes import Rattle, slow_rates, slowing
 from sweep.models.theory.linear import NODES, through_nodes
 
 # The fastest spin within reach, in units of the spin whose energy is there.
@@ -30,13 +30,16 @@ _REACH = 1.02
 _APART = 5.0
 
 # A step lasts half of what a mode takes to change by e, and turns the spin by no more than this share of what it can.
-# A mode that turns the spin by less than a share `_FAINT` of what the other does sets no step.
-_RATE, _TURN, _FAINT = 0.5, 0.02, 1e-4
+# A mode that turns the spin by less than a share `_FAINT` of what the other does sets no step.  A couple slows the spin
+# by no more than a share `_SLOWED` in a step.
+_RATE, _TURN, _FAINT, _SLOWED = 0.5, 0.02, 1e-4, 0.1
 
 # Divides where there may be a zero.
 _TINY = 1e-300
 
-# It is over when both modes decay, and can change the spin by no more than this share.  That takes 100 to 1000 steps.
+# It is over when both modes decay, and can change the spin by no more than this share; or beside a couple, when of the
+# spin and of what each mode makes of it, the one that decays most slowly is that much larger than the others.  That
+# takes 100 to 1000 steps.
 _OVER, _MOST_STEPS = 1e-3, 5000
 
 
@@ -44,13 +47,14 @@ class Ending(NamedTuple):
     """How trajectories end; arrays of shape (cells,), NaN where the slow equations do not apply."""
 
     spin: Array
-    """The spin that remains, in sqrt(g/c)."""
+    """The spin that remains, in sqrt(g/c); beside a couple, when it is clear that it will reverse no more."""
     reversals: Array
     """Number of reversals until then."""
     overshoot: Array
     """Largest |spin| since the last reversal, or since the beginning."""
     nearest_approach: Array
-    """Smallest |spin| after that."""
+    """Smallest |spin| after that; beside a couple, as a share of that and of what both modes can still do to it, times
+    the fastest spin within reach."""
 
 
 def ending(form: StiffForm, states: Array, constants: Any) -> Ending:
@@ -69,11 +73,13 @@ def ending(form: StiffForm, states: Array, constants: Any) -> Ending:
     if not len(known):
         return result
     rates, slopes, apart = _fits(form, take(constants, known), reach[known])
+    upright = -take(constants, known).J33 * reach[known]
+    slowed = slowing(form, upright, take(constants, known)) / upright
     known = known[apart]
     unit = reach[known]
     n, log_e = spin[known] / unit, np.log(np.maximum(e[known] / unit[:, None] ** 2, _TINY))
     found = np.empty((len(known), 4))
-    compiled_following()(n, log_e, rates[apart], slopes[apart] * unit[:, None, None], found)
+    compiled_following()(n, log_e, rates[apart], slopes[apart] * unit[:, None, None], -slowed[apart], found)
     for whole, part, scale in zip(result, found.T, (unit, 1.0, unit, unit), strict=True):
         whole[known] = part * scale
     return result
@@ -100,50 +106,67 @@ def _at(coefficients, n):
 
 
 @called
-def _change(e, r, s, step):
-    """How much a mode lowers the spin in a step in which it grows at a constant rate."""
-    growth = 2.0 * r * step
-    return s * e * (step if growth == 0.0 else np.expm1(growth) / (2.0 * r))
+def _change(e, r, s, d, step):
+    """How much a mode lowers the spin in a step in which it grows at a constant rate, before a couple slows both."""
+    rate = 2.0 * r + d
+    growth = rate * step
+    return s * e * (step if growth == 0.0 else np.expm1(growth) / rate)
 
 
 @called
-def _step(r, s, e):
+def _lasts(n, r, d, left0, left1):
+    """What decays most slowly, and all that decays faster: the spin, or what a mode makes of it beside a couple."""
+    if d < min(-2.0 * r[0], -2.0 * r[1]):
+        return abs(n), abs(left0) + abs(left1)
+    rest = abs(n + left0 + left1)
+    return (abs(left1), rest + abs(left0)) if r[1] > r[0] else (abs(left0), rest + abs(left1))
+
+
+@called
+def _step(r, s, d, e):
     """Length of the next step."""
     turn0, turn1 = abs(s[0]) * e[0], abs(s[1]) * e[1]
     turn, least = turn0 + turn1, _FAINT * (turn0 + turn1)
     way = np.sqrt(e[0]) + np.sqrt(e[1]) + min(abs(r[0]), abs(r[1])) / max(abs(s[0]), abs(s[1]), _TINY)
     fastest = max(abs(r[0]) if turn0 > least else 0.0, abs(r[1]) if turn1 > least else 0.0)
     by_turn: float = _TURN * way / max(turn, _TINY)
-    return min(_RATE / max(fastest, _TINY), by_turn)
+    return min(_RATE / max(fastest, _TINY), by_turn, _SLOWED / max(d, _TINY))
 
 
-def _follow(spin: Array, log_e: Array, rates: Array, slopes: Array, endings: Array) -> None:
+def _follow(spin: Array, log_e: Array, rates: Array, slopes: Array, slowing: Array, endings: Array) -> None:
     """Follow the slow equations to their end, which is written to `endings`, of shape (cells, 4): NaN without one.
 
     Spins are in units of the fastest within reach, and e in its square: its logarithm, because a mode may grow again
-    from less than a number can be.  The coefficients are of shape (cells, 5, 2).
+    from less than a number can be.  The coefficients are of shape (cells, 5, 2), and the rates d at which a couple
+    slows the spin of shape (cells,).
     """
     for i in range(len(spin)):
         endings[i] = np.nan
-        n, log0, log1 = spin[i], log_e[i, 0], log_e[i, 1]
+        n, log0, log1, d = spin[i], log_e[i, 0], log_e[i, 1], slowing[i]
         reversals, overshoot, nearest = 0, abs(n), abs(n)
         for _ in range(_MOST_STEPS):
             r, s, e0, e1 = _at(rates[i], n), _at(slopes[i], n), np.exp(log0), np.exp(log1)
-            left0 = s[0] * e0 / (2.0 * r[0]) if s[0] * e0 != 0.0 else 0.0
-            left1 = s[1] * e1 / (2.0 * r[1]) if s[1] * e1 != 0.0 else 0.0
-            over = (r[0] < 0.0) & (r[1] < 0.0) & (abs(left0) + abs(left1) < _OVER * abs(n))
+            left0 = s[0] * e0 / (2.0 * r[0] + d) if s[0] * e0 != 0.0 else 0.0
+            left1 = s[1] * e1 / (2.0 * r[1] + d) if s[1] * e1 != 0.0 else 0.0
+            lasting, others = _lasts(n, r, d, left0, left1)
+            over = (r[0] < 0.0) & (r[1] < 0.0) & (others < _OVER * lasting)
             if over:
-                after = n + left0 + left1
+                after = n + left0 + left1 if d == 0.0 else n
             else:
-                step = _step(r, s, (e0, e1))
-                middle = n - _change(e0, r[0], s[0], 0.5 * step) - _change(e1, r[1], s[1], 0.5 * step)
+                step = _step(r, s, d, (e0, e1))
+                half = 0.5 * step
+                middle = n - _change(e0, r[0], s[0], d, half) - _change(e1, r[1], s[1], d, half)
+                middle *= np.exp(-d * half)
                 r, s = _at(rates[i], middle), _at(slopes[i], middle)
-                after = n - _change(e0, r[0], s[0], step) - _change(e1, r[1], s[1], step)
+                after = n - _change(e0, r[0], s[0], d, step) - _change(e1, r[1], s[1], d, step)
+                after *= np.exp(-d * step)
                 log0, log1 = log0 + 2.0 * r[0] * step, log1 + 2.0 * r[1] * step
             size, reverses = abs(after), n * after < 0.0
             further = reverses | (size >= overshoot)
             reversals += reverses
             overshoot = size if further else overshoot
+            if d > 0.0:
+                size /= size + abs(s[0]) * e0 / (2.0 * abs(r[0]) + d) + abs(s[1]) * e1 / (2.0 * abs(r[1]) + d)
             nearest = size if further | (size < nearest) else nearest
             n = after
             if over:
@@ -154,4 +177,4 @@ def _follow(spin: Array, log_e: Array, rates: Array, slopes: Array, endings: Arr
 @cache
 def compiled_following() -> Cached:
     """`_follow`, compiled."""
-    return serial(_follow, "(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])", "slow-equations")
+    return serial(_follow, "(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1])", "slow-equations")

@@ -33,8 +33,9 @@ RATTLE = (0, 1, 2, 3, 5, 6)
 # Decay rate of the slip, in sqrt(g/h), above which friction counts as stopping the slip fast compared with the rattle.
 SLIP_DECAY = 0.3
 
-# Amplitude at which quadratic forms are evaluated: the neglected terms are 1e-16 of them.
-_SMALL = 1e-8
+# Amplitude at which quadratic forms are evaluated: the neglected terms are its square.  Beside a couple, whose effect
+# on the spin is taken off, it is larger, because of round-off.
+_SMALL, _BESIDE_COUPLES = 1e-8, 1e-5
 
 
 @dataclass(frozen=True)
@@ -176,15 +177,20 @@ def _rocking(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array
     return rates, to_momentum @ modes, np.asarray(fast.all(axis=1) & (rates.imag > 0).all(axis=1))
 
 
+def _small(form: StiffForm) -> float:
+    return _BESIDE_COUPLES if form.full.variant.couples else _SMALL
+
+
 def _turning(form: StiffForm, modes: Array, upright: Array, constants: Any) -> Array:
     """B by polarisation: B(x, y) = (M3'(x + y) - M3'(x - y))/4."""
-    both = np.moveaxis(np.concatenate([modes, modes.conj()], axis=2), 0, -1) * _SMALL
+    small = _small(form)
+    both = np.moveaxis(np.concatenate([modes, modes.conj()], axis=2), 0, -1) * small
     one, other = both[:, :, None], both[:, None, :]
     forms = []
     for rattle in (one + other, one - other):
         slopes, _ = form.slow(*np.insert(rattle, 4, upright, axis=0), constants)
         forms.append(slopes[4])
-    return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * _SMALL**2), -1, 0))
+    return np.asarray(np.moveaxis((forms[0] - forms[1]) / (4 * small**2), -1, 0))
 
 
 def _unit_energies_and_turns(
@@ -195,13 +201,21 @@ def _unit_energies_and_turns(
     It clears `sound` where fast spin makes the energy of a mode negative, and takes 1 for that.
     """
     energies = turns = np.zeros((modes.shape[2], len(upright)))
+    slowed, small = slowing(form, upright, constants), _small(form)
     for part in (modes.real, modes.imag):
-        states = np.insert(np.moveaxis(part, 0, -1) * _SMALL, 4, upright, axis=0)
+        states = np.insert(np.moveaxis(part, 0, -1) * small, 4, upright, axis=0)
         _, rattle, inertia = form.model.energy(states, constants)
-        energies = energies + 4 * rattle / inertia / _SMALL**2
-        turns = turns + 2 * form.slow(*states, constants)[0][4] / _SMALL**2
+        energies = energies + 4 * rattle / inertia / small**2
+        turns = turns + 2 * (form.slow(*states, constants)[0][4] - slowed) / small**2
     sound &= (energies > 0).all(axis=0)
     return np.where(energies > 0, energies, 1.0).T, turns.T
+
+
+def slowing(form: StiffForm, upright: Array, constants: Any) -> Array:
+    """M3' in upright spin, by couples alone, shape (cells,)."""
+    rest = np.zeros_like(upright)
+    slopes, _ = form.slow(rest, rest, rest, rest, upright, rest, rest, constants)
+    return np.asarray(slopes[4] + rest)
 
 
 def _form(matrix: Array, amplitudes: Array) -> Array:
