@@ -203,8 +203,8 @@ def changes(
 
     Returns
     -------
-    Dataset over the parameters: the relative `change`, the simulated values at which the count is still as it is and at
-    which it has changed, a thousandth apart, and the count there. NaN where no such value is foreseen, or where
+    Dataset over the parameters: the relative `change`, the first simulated value with such a count and the last one
+    without it, a thousandth apart, and the count there. NaN where no such value is foreseen, or where
     simulations do not confirm it. The attribute `reversals` is the count of the body as it is.
 
     Raises

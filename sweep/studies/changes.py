@@ -31,12 +31,12 @@ _TOGETHER, _WIDTH, _FARTHER = 12, 1e-3, 1.25
 
 @dataclass
 class _Bracket:
-    """Two values of a parameter: with the count of the cell and, once it is found, with another one."""
+    """Two values of a parameter, between which the count changes: as foreseen, until cells have been simulated."""
 
     near: float
     far: float
-    count: int = -1
-    """The count at `far`; -1 until simulations have found another one."""
+    count: int
+    """The count at `far`."""
 
     @property
     def wide(self) -> bool:
@@ -46,11 +46,12 @@ class _Bracket:
         """Values between the two, and the second."""
         return np.asarray(self.near * (self.far / self.near) ** (np.arange(1, _TOGETHER + 1) / _TOGETHER))
 
-    def narrow(self, counts: Array, reach: Array) -> None:
-        """Keep the first part at whose end the count is one to `reach`."""
+    def narrow(self, counts: Array, reach: Array) -> bool:
+        """Keep the first part at whose end the count is one to `reach`; return whether there is one."""
         if reach.any():
             first, ends = int(np.argmax(reach)), [self.near, *self.places()]
             self.near, self.far, self.count = ends[first], ends[first + 1], int(counts[first])
+        return bool(reach.any())
 
 
 def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
@@ -68,8 +69,7 @@ def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
             columns[name][i] = places
         counts = _counts(config, {name: values.ravel() for name, values in columns.items()}, reporter)
         for name, theirs in zip(wide, counts.reshape(len(wide), _TOGETHER), strict=True):
-            brackets[name].narrow(theirs, _reach(theirs, now, reversals))
-            if brackets[name].count < 0:
+            if not brackets[name].narrow(theirs, _reach(theirs, now, reversals)):
                 del brackets[name]
     return _dataset(config, cell, now, brackets)
 
@@ -94,15 +94,16 @@ def _foreseen(config: Config, cell: Mapping[str, float], reversals: int) -> dict
     for i, name in enumerate(names):
         columns[name][i] *= factors
     flat = {name: values.ravel() for name, values in columns.items()}
-    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"].reshape(len(names), _PLACES)
+    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"]
+    counts = np.where(config.equations.impossible(flat), -1, counts).reshape(columns[names[0]].shape)
     middle, brackets = _PLACES // 2, dict[str, _Bracket]()
     for i, name in enumerate(names):
         allowed = np.array([config.table[name].allows(value) for value in columns[name][i]])
-        reached = allowed & _reach(counts[i], counts[i, middle], reversals)
-        if reached.any():
-            nearest = np.abs(np.flatnonzero(reached) - middle).argmin()
-            factor = factors[np.flatnonzero(reached)[nearest]]
-            brackets[name] = _Bracket(cell[name], cell[name] * factor**_FARTHER)
+        reached = np.flatnonzero(allowed & _reach(counts[i], counts[i, middle], reversals))
+        if reached.size:
+            nearest = reached[np.abs(reached - middle).argmin()]
+            far = cell[name] * factors[nearest] ** _FARTHER
+            brackets[name] = _Bracket(cell[name], far, int(counts[i, nearest]))
     return brackets
 
 
@@ -126,7 +127,7 @@ def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapp
     columns = {
         "value": ([value for value, _ in rows], "value of the parameter"),
         "change": ([each.far / value - 1 for value, each in rows], "relative change that gives the other count"),
-        "unchanged_at": ([each.near for _, each in rows], "last simulated value with the count as it is"),
+        "unchanged_at": ([each.near for _, each in rows], "last simulated value before that"),
         "changed_at": ([each.far for _, each in rows], "first simulated value with the other count"),
         "reversals": ([each.count for _, each in rows], "spin reversals there, simulated"),
     }
