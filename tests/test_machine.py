@@ -69,8 +69,10 @@ def run_machine(number: int, runs: int, kernels: int = 0, **parts: Any) -> int:
         suppress_health_check=list(HealthCheck),
         phases=[Phase.generate, *([Phase.shrink] if os.environ.get("SWEEP_MACHINE_SEED", "new") != "new" else [])],
     )  # fmt: skip
-    run_state_machine_as_test(kind, settings=how)
-    print(f"{kind.done} combinations")
+    try:
+        run_state_machine_as_test(kind, settings=how)
+    finally:
+        print(f"{kind.done} combinations")
     return kind.done
 
 
