@@ -62,13 +62,14 @@ def animate(
         raise fault_of(f"{speed:g}; give a number above zero", "speed")
     shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if not body.drawable(shown):
-        raise fault_of("its bodies have no attitude, or no a, b and c; animate trajectories of slip or noslip")
+        raise fault_of("has no attitude, or no a, b and c; animate trajectories of slip or noslip", "source")
     if (bodies := shown.sizes["trajectory"]) > MOST:
-        raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}")
+        raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}", "source")
     last = float(shown["time"][-1])
     end = min(_until(shown) if end is None else end, last)
     if not begin < end:
-        raise fault_of(f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}")
+        words = f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}"
+        raise fault_of(words, "begin")
     seconds = SECONDS if speed is None else (end - begin) / speed
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
     if path is not None and suffix(path) != "mp4" and count > MOST_FRAMES + 1:

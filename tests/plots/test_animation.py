@@ -119,11 +119,11 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
 
 
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="no attitude"):
+    with pytest.raises(ConfigError, match=r"^source: has no attitude"):
         animation.animate(turning().drop_vars("heading"))
-    with pytest.raises(ConfigError, match="at most 6"):
+    with pytest.raises(ConfigError, match=r"^source: .*at most 6"):
         animation.animate(turning(7))
-    with pytest.raises(ConfigError, match="nothing lies between"):
+    with pytest.raises(ConfigError, match=r"^begin: nothing lies between"):
         animation.animate(turning(), begin=11)
     for speed in (0, -5, np.nan):
         with pytest.raises(ConfigError, match=f"speed: {speed:g}; give a number above zero"):
