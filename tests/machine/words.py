@@ -108,8 +108,10 @@ CUTS: dict[str, Callable[[xr.Dataset, str, Random], xr.Dataset]] = {
     "mean": lambda dataset, dim, _: dataset.mean(dim),
     "mean of all": lambda dataset, *_: dataset.mean(),
     "max": lambda dataset, dim, _: dataset.max(dim, keep_attrs=True),
-    "stack": lambda dataset, dim, _: dataset.stack(
-        {f"both_{dim}": [dim, *(each for each in dataset.dims if each != dim)][:2]}
+    "stack": lambda dataset, dim, _: dataset.stack(  # once: xarray stacks no stacked dimension
+        {}
+        if any(str(each).startswith("both_") for each in dataset.dims)
+        else {f"both_{dim}": [dim, *(each for each in dataset.dims if each != dim)][:2]}
     ),
     "transpose": lambda dataset, *_: dataset.transpose(*reversed([*dataset.dims])),
     "drop": lambda dataset, _, random: dataset.drop_vars(random.choice([*dataset.data_vars])),
