@@ -203,9 +203,10 @@ def changes(
 
     Returns
     -------
-    Dataset over the parameters: the relative `change`, the first simulated value with such a count and the last one
-    without it, a thousandth apart, and the count there. NaN where no such value is foreseen, or where
-    simulations do not confirm it. The attribute `reversals` is the count of the body as it is.
+    Dataset over the parameters: the relative `change`; `changed_at`, the first simulated value with the requested
+    count; `unchanged_at`, the last one without it, at most 0.1 % away; and `reversals`, the count at `changed_at`.
+    Where no such value is foreseen, or simulations do not confirm it, the values are NaN and `reversals` is the
+    present count. The attribute `reversals` is the present count.
 
     Raises
     ------

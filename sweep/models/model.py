@@ -49,12 +49,11 @@ COUNT, SPIN, ENERGY, MODES, FORMULAS = "count", "spin", "energy", "modes", "form
 ENDING = "ending"
 LINEAR = "linear"
 REVERSAL_TIME = "reversal_time"
-"""What a model may offer: a number of reversals; the spin as a function of time; an energy that only friction changes;
-two rocking modes that the linear theory of the slip model describes, which alone change the spin; Takano's formulas for
-the critical spins and the number of reversals.  `ENDING`: slow equations that predict how a small rattle ends,
-also beside a couple that slows the spin.  `LINEAR`: the spins between which a tiny rattle decays, by the eigenvalues of
-its Jacobian, at which trajectories may settle.  `REVERSAL_TIME`: Garcia and Hubbard's formula for the time of the first
-reversal."""
+"""What a model may offer, in this order: a number of reversals; the spin as a function of time; an energy that only
+friction changes; two rocking modes that the linear theory of the slip model describes, which alone change the spin;
+Takano's formulas for the critical spins and the number of reversals; slow equations that predict how a small rattle
+ends, also with a couple that slows the spin; the spins between which a tiny rattle decays, by the eigenvalues of its
+Jacobian, at which trajectories may settle; and Garcia and Hubbard's formula for the time of the first reversal."""
 
 
 OWN = "own"

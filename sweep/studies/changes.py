@@ -79,9 +79,9 @@ def _cell(config: Config) -> dict[str, float]:
     require_certain(config)
     if config.grid.size > 1:
         name = next(name for name, values in {**config.axes, **config.cases}.items() if len(values) > 1)
-        raise ConfigError([config.fault(config.table[name].place, "has several values; give that of one body")])
+        raise ConfigError([config.fault(config.table[name].place, "has several values; give a single one")])
     if MODES not in config.equations.offers:
-        message = "has no foreseen counts; they need a body without couples, with viscous friction"
+        message = "has no foreseen counts; choose viscous friction without couples"
         raise ConfigError([config.fault(("model",), message)])
     return {name: float(column[0]) for name, column in config.grid.columns().items()}
 
@@ -120,7 +120,7 @@ def _counts(config: Config, columns: Mapping[str, Array], reporter: Reporter) ->
 
 
 def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapping[str, _Bracket]) -> xr.Dataset:
-    """Return what was found for each parameter that can change; NaN, and the count as it is, where nothing was."""
+    """Label the brackets; a parameter without one has NaN and the present count."""
     names = [name for name, value in cell.items() if value]
     nothing = _Bracket(np.nan, np.nan, now)
     rows = [(cell[name], brackets.get(name, nothing)) for name in names]

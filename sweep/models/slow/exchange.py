@@ -11,8 +11,8 @@ where Y has no part along the rocking modes, w is cubic in a and its conjugate, 
 up to terms of order |a|⁵ and |a|⁶.  With the Jacobian A of the full model at the spin n, A (1 + Y) = (1 + Y) C, so that
 C has the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2): their
 harmonics that do not turn with a mode, divided by their frequencies.  Unlike modes at n, all these are smooth functions
-of n where the two frequencies meet.  C and H are computed at five spins, T and Q at three, with
-polynomials between them.
+of n where the two frequencies meet.  C and H are computed at five spins, T and Q at three, with polynomials between
+them.
 
 The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory
 reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
@@ -46,8 +46,8 @@ _THREE = 3
 _ODD = np.array([(1, 0), (1, 0), (0, 1), (0, 1), (2, -1), (-1, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
 _EVEN = np.array([(0, 0), (1, -1), (2, -2), (2, 0), (1, 1), (0, 2)])
 
-# Phases of both modes on a torus, in eighths of a turn: of the second, half a turn is enough, because the equations are
-# odd.  The first points are those for the first mode alone, and from the last of these on, those for the second.
+# Phases of both modes on a torus, in eighths of a turn.  The second mode needs only half a turn, because the equations
+# are odd.  The first four points serve the first mode alone; the last of these and the next three the second alone.
 _PHASES, _FIRST, _SECOND = 8, 4, 7
 _ALONE = [(3, 0), (2, 0), (1, 0), (0, 0), (0, 1), (0, 2), (0, 3)]
 _PLACES = np.array([*_ALONE, *sorted({*np.ndindex(_PHASES, _PHASES // 2)} - {*_ALONE})])
@@ -298,8 +298,6 @@ def make_exchange(model: Model):
             slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], slopes[4, i], slopes[5, i], slopes[6, i] = rates
         share, sums = 1.0 / (last - first), np.zeros(2 * len(THIRD))
         _clear(odd)
-        for m in range(len(even)):
-            even[m] = 0.0
         _resolve(slopes[4], _EVEN_TURNS, first, last, sums)
         for m in range(len(even)):
             even[m] = share * (sums[2 * m] + 1j * sums[2 * m + 1])

@@ -12,8 +12,8 @@ import numpy as np
 from sweep.jit import called, inline
 from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS
 
-# A step turns the spin by no more than this share of what a mode can, and by so little that the rates, which change by
-# |H| with the spin, change no amplitude by more than this factor (in logarithms) against the middle of the step.
+# A step turns the spin by no more than this share of what a mode can.  The rates, whose derivative by the spin is about
+# |H|, change the logarithm of an amplitude in a step by no more than `_CHANGE` compared with constant rates.
 _TURN, _CHANGE = 0.04, 0.3
 
 # The beat advances by no more than this phase in a step where its part in T changes the rates by more than a share

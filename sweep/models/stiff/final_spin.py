@@ -37,9 +37,9 @@ _RATE, _TURN, _FAINT, _SLOWED = 0.5, 0.02, 1e-4, 0.1
 # Divides where there may be a zero.
 _TINY = 1e-300
 
-# It is over when both modes decay, and can change the spin by no more than this share; or beside a couple, when of the
-# spin and of what each mode makes of it, the one that decays most slowly is that much larger than the others.  That
-# takes 100 to 1000 steps.
+# It is over when both modes decay, and can change the spin by no more than this share.  With a couple, the spin is a
+# sum of three decaying terms, its own and one of each mode: it is over when the slowest exceeds the others that much.
+# That takes 100 to 1000 steps.
 _OVER, _MOST_STEPS = 1e-3, 5000
 
 
@@ -47,14 +47,14 @@ class Ending(NamedTuple):
     """How trajectories end; arrays of shape (cells,), NaN where the slow equations do not apply."""
 
     spin: Array
-    """The spin that remains, in sqrt(g/c); beside a couple, when it is clear that it will reverse no more."""
+    """The spin that remains, in sqrt(g/c); with a couple, the spin when it can no longer reverse."""
     reversals: Array
     """Number of reversals until then."""
     overshoot: Array
     """Largest |spin| since the last reversal, or since the beginning."""
     nearest_approach: Array
-    """Smallest |spin| after that; beside a couple, as a share of that and of what both modes can still do to it, times
-    the fastest spin within reach."""
+    """Smallest |spin| after that.  With a couple, which slows all spins, it is the smallest share that |spin| has in
+    the sum of |spin| and of what both modes can still do to it, times the fastest spin within reach."""
 
 
 def ending(form: StiffForm, states: Array, constants: Any) -> Ending:
@@ -72,14 +72,15 @@ def ending(form: StiffForm, states: Array, constants: Any) -> Ending:
     known = np.flatnonzero(rattle.sound & np.isfinite(reach) & (reach > 0))
     if not len(known):
         return result
-    rates, slopes, apart = _fits(form, take(constants, known), reach[known])
-    upright = -take(constants, known).J33 * reach[known]
-    slowed = slowing(form, upright, take(constants, known)) / upright
+    theirs = take(constants, known)
+    rates, slopes, apart = _fits(form, theirs, reach[known])
+    upright = -theirs.J33 * reach[known]
+    slowed = -slowing(form, upright, theirs) / upright
     known = known[apart]
     unit = reach[known]
     n, log_e = spin[known] / unit, np.log(np.maximum(e[known] / unit[:, None] ** 2, _TINY))
     found = np.empty((len(known), 4))
-    compiled_following()(n, log_e, rates[apart], slopes[apart] * unit[:, None, None], -slowed[apart], found)
+    compiled_following()(n, log_e, rates[apart], slopes[apart] * unit[:, None, None], slowed[apart], found)
     for whole, part, scale in zip(result, found.T, (unit, 1.0, unit, unit), strict=True):
         whole[known] = part * scale
     return result
@@ -115,7 +116,7 @@ def _change(e, r, s, d, step):
 
 @called
 def _lasts(n, r, d, left0, left1):
-    """What decays most slowly, and all that decays faster: the spin, or what a mode makes of it beside a couple."""
+    """Sizes of the most slowly decaying term of the spin, and of the others together."""
     if d < min(-2.0 * r[0], -2.0 * r[1]):
         return abs(n), abs(left0) + abs(left1)
     rest = abs(n + left0 + left1)

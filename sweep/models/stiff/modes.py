@@ -33,9 +33,9 @@ RATTLE = (0, 1, 2, 3, 5, 6)
 # Decay rate of the slip, in sqrt(g/h), above which friction counts as stopping the slip fast compared with the rattle.
 SLIP_DECAY = 0.3
 
-# Amplitude at which quadratic forms are evaluated: the neglected terms are its square.  Beside a couple, whose effect
-# on the spin is taken off, it is larger, because of round-off.
-_SMALL, _BESIDE_COUPLES = 1e-8, 1e-5
+# Amplitude at which quadratic forms are evaluated: the neglected terms are its square.  With a couple, whose effect on
+# the spin is subtracted, it is larger, because of round-off.
+_SMALL, _WITH_COUPLES = 1e-8, 1e-5
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ def _rocking(form: StiffForm, constants: Any, spin: Array) -> tuple[Array, Array
 
 
 def _small(form: StiffForm) -> float:
-    return _BESIDE_COUPLES if form.full.variant.couples else _SMALL
+    return _WITH_COUPLES if form.full.variant.couples else _SMALL
 
 
 def _turning(form: StiffForm, modes: Array, upright: Array, constants: Any) -> Array:
@@ -214,8 +214,10 @@ def _unit_energies_and_turns(
 def slowing(form: StiffForm, upright: Array, constants: Any) -> Array:
     """M3' in upright spin, by couples alone, shape (cells,)."""
     rest = np.zeros_like(upright)
+    if not form.full.variant.couples:
+        return rest
     slopes, _ = form.slow(rest, rest, rest, rest, upright, rest, rest, constants)
-    return np.asarray(slopes[4] + rest)
+    return np.asarray(slopes[4])
 
 
 def _form(matrix: Array, amplitudes: Array) -> Array:
