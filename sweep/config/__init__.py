@@ -72,14 +72,13 @@ def load_config(
     known = loading.table(origin)
     for key, value in (overrides or {}).items():
         source.set(_full_path(key, known), plain_data(value), argument(key))
-    if isinstance(table := source.values.get("cases"), dict):
-        source.known["cases", "cases"], source.values["cases"] = cases.of_columns(source, table, known), "cases"
     # A name derived from the file name must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
     source.values.setdefault("name", stem or "sweep")
     kind = schema.schema_of(origin)
     try:
-        values = kind.model_validate(source.values)
+        given = isinstance(source.values.get("cases"), dict)  # columns, which are checked as those of a file are
+        values = kind.model_validate(source.values | ({"cases": ""} if given else {}))
     except ValidationError as error:
         found = explain(error.errors(), kind).items()
         raise ConfigError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
@@ -117,9 +116,8 @@ def _source(config: ConfigLike) -> document.Document:
     values = config.document()
     known: dict[tuple[str, str], Any] = {("film", config.film_file): config.film}
     known["model", config.model] = config.origin
-    if config.cases and not config.samples:
-        values["cases"] = config.cases_file or "cases"
-        known["cases", values["cases"]] = config.cases, {}
+    if config.cases_file:
+        known["cases", config.cases_file] = config.cases, {}
     return document.Document("", values, known=known)
 
 
@@ -137,7 +135,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     columns: cases.Columns = {}
     units_of_cases: dict[faults.Path, str] = {}
     if values.cases is not None:  # it may be ""
-        columns, units = source.once("cases", values.cases, lambda: cases.read(source, values.cases, known))
+        columns, units = cases.read(source, known)
         units_of_cases = {("cases", name): unit for name, unit in units.items() if unit}
     seen = film_in(values.measure or ())
     physics = _physics(values, origin, frozenset((*present(given), *columns)))

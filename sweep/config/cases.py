@@ -23,8 +23,8 @@ Place = Callable[[faults.Path, str], Fault]
 """Makes a fault from a path in a table (the name of a column, the number of a row) and a message."""
 
 
-def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
-    """Read the table `name`, a path relative to the configuration's folder, and check it cell by cell.
+def read(source: Document, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
+    """Read the table of a configuration, which is a file beside it or lists by column, and check it cell by cell.
 
     Parameters
     ----------
@@ -39,6 +39,14 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[C
     ConfigError
         if the file cannot be read, or with a `Fault` for each cell that is wrong.
     """
+    table = source.values["cases"]
+    if isinstance(table, dict):
+        return _checked(table, lambda path, message: source.fault(("cases", *path), message), known)
+    found: tuple[Columns, Units] = source.once("cases", table, lambda: _of_file(source, table, known))
+    return found
+
+
+def _of_file(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
     if name.endswith(".parquet"):
         message = "Parquet files are not supported; read it with pandas and pass the DataFrame, or save it as CSV"
         raise ConfigError([source.fault(("cases",), f"{brief(name)}: {message}")])
@@ -64,11 +72,6 @@ def read(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[C
 
     columns, more = _checked(cells, place, known)
     return columns, more | units
-
-
-def of_columns(source: Document, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
-    """Check a table given by column in the configuration itself; returns and raises as `read`."""
-    return _checked(table, lambda path, message: source.fault(("cases", *path), message), known)
 
 
 def _checked(table: Mapping[str, Any], place: Place, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:

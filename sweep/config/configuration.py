@@ -77,6 +77,7 @@ class Config:
     cases: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Columns of the table of cases or of the samples, if there is one."""
     cases_file: str | None = None
+    """The file of that table; "" if the configuration itself gives the columns, None without a table."""
     samples: int | None = None
     """Number of samples drawn from the distributions, if there are any."""
     seed: int = 0
@@ -212,11 +213,12 @@ class Config:
                 found[section][name] = value.spec
             else:
                 found[name] = value.spec
+        columns = {} if self.samples else {name: list(column) for name, column in self.cases.items()}
         return {
             "name": self.name,
             "model": self.model,
             **top,
-            **({"cases": self.cases_file} if self.cases_file else {}),
+            **({"cases": self.cases_file or columns} if columns else {}),
             **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
             **{key: values for key, values in found.items() if values != {}},
             "integrator": self.integrator.model_dump(),
@@ -231,11 +233,17 @@ class Config:
 
     def to_yaml(self) -> str:
         """Return the whole configuration as the text of a YAML file."""
-        stream = StringIO()
-        yaml = YAML(typ="safe", pure=True)
-        yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-        yaml.dump(self.document(), stream)
-        return stream.getvalue()
+        return _yaml(self.document())
+
+    def label(self) -> str:
+        """Return the text of the configuration for a dataset, whose coordinates hold the columns of a table of cases.
+
+        A long table would take half a minute to write and to read as YAML.
+        """
+        found = self.document()
+        if isinstance(found.get("cases"), dict):
+            found["cases"] = "coordinates of the dimension case"
+        return _yaml(found)
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the numbers, unlike the name or the pictures."""
@@ -246,3 +254,11 @@ class Config:
         seen = [self.film.sha256] if self.film else []
         text = json.dumps([decisive, list(self.axes), self.cases or None, *seen], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _yaml(document: Mapping[str, Any]) -> str:
+    stream = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.dump(document, stream)
+    return stream.getvalue()

@@ -93,8 +93,8 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
         if name not in model.parameters and value.is_axis:
             yield path, f"the {model.name} model has no {name}; its parameters are {', '.join(model.parameters)}"
         elif name in columns and not config.samples:
-            yield path, f"is also a column of {config.cases_file}; remove one of the two"
-        elif config.cases_file and (value.is_axis or value.distribution):
+            yield path, f"is also a column of {config.cases_file or 'cases'}; remove one of the two"
+        elif config.cases_file is not None and (value.is_axis or value.distribution):
             kind = "a distribution" if value.distribution else "an axis"
             yield path, f"cannot be {kind} together with cases; give a number, or add a column to the table"
         elif config.samples and (beyond := [n for n in columns.get(name, ()) if not config.table[name].allows(n)]):

@@ -34,7 +34,7 @@ def decisive_sources() -> list[Path]:
 
 def identify(config: Config) -> Identity:
     """Return the identity of the results that this program computes for `config`."""
-    return Identity(config.to_yaml(), config.fingerprint(), *sources())
+    return Identity(config.label(), config.fingerprint(), *sources())
 
 
 @cache

@@ -132,5 +132,5 @@ def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapp
         "reversals": ([each.count for _, each in rows], "spin reversals there, simulated"),
     }
     variables = {name: ("parameter", values, {"long_name": meaning}) for name, (values, meaning) in columns.items()}
-    attributes = {"title": f"{config.name}: changes of {now} reversals", "config": config.to_yaml(), "reversals": now}
+    attributes = {"title": f"{config.name}: changes of {now} reversals", "config": config.label(), "reversals": now}
     return xr.Dataset(variables, {"parameter": names}, attributes)

@@ -34,4 +34,4 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     config = load_config(config, overrides)
     grid = config.grid
     found = prediction.predict(config.tier, grid, config.measure).variables
-    return dataset.label(config, grid, found, {"config": config.to_yaml()})
+    return dataset.label(config, grid, found, {"config": config.label()})

@@ -68,6 +68,7 @@ def test_cases_given_by_columns(table: Callable[..., Any]) -> None:
     other = load_config({"start": {"x0": 0.01}}, {"cases": {"mu": [60.0, 131.0], "n0": [0.05, -0.02]}})
     assert other.fingerprint() != config.fingerprint()
     assert load_config({"start": {"x0": 0.01}, "cases": columns}).fingerprint() == config.fingerprint()
+    assert len(config.label()) < len(config.to_yaml())
 
 
 @pytest.mark.parametrize(
@@ -157,12 +158,16 @@ UNCERTAIN = "start: {x0: {uniform: [0, 0.02]}}\nbody: {c: {normal: [1, 0.01]}}\n
 FIRST = (
     "start: {x0: {uniform: [0, 0.02]}, n0: {uniform: [0.05, 0.06]}}\nfriction: {mu: {uniform: [50, 60]}}\nsamples: 4\n"
 )
+ROWS = "cases: {mu: [60, 130], roll: [2 deg, 0.01]}\n"
 
 
 @pytest.mark.parametrize(
     "text",
-    [SMALL, STONE, BOWL, GRAVITY.replace("sigma: 1.0e-4", "sigma: [0, 1.0e-4]"), UNCERTAIN, FIRST],
-    ids=["paper", "ellipsoid", "paraboloid", "axis of gravity", "samples", "samples of what would be the first axes"],
+    [SMALL, STONE, BOWL, GRAVITY.replace("sigma: 1.0e-4", "sigma: [0, 1.0e-4]"), UNCERTAIN, FIRST, ROWS],
+    ids=[
+        "paper", "ellipsoid", "paraboloid", "axis of gravity", "samples", "samples of what would be the first axes",
+        "columns of cases",
+    ],
 )
 def test_it_survives_its_own_document(text: str, read: Read) -> None:
     config = read(text)

@@ -195,10 +195,9 @@ class Machine(RuleBasedStateMachine):
 
     def _foreseen(self, scene: Scene, found: xr.Dataset | None = None) -> None:
         """It is the same when it is read again, and is predicted as it is run."""
-        if scene.config.row != "case" or not scene.config.cases:  # a table stands in no document
-            again = load_config(self._written(scene.config.to_yaml()))
-            assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
-            assert list(again.axes) == list(scene.config.axes)
+        again = load_config(self._written(scene.config.to_yaml()))
+        assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
+        assert list(again.axes) == list(scene.config.axes)
         invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")
         predicted = sweep.predict(scene.config)
         for name in predicted.data_vars if found is not None else ():
