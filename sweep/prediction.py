@@ -39,6 +39,7 @@ class Prediction(NamedTuple):
     """Ranges of spin in which the rattle decays, shape (7, cells), as `stability.stable_ranges` gives them."""
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of the cells that the model does not fit
 def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction:
     """The whole prediction, with the eigenvalues where the tier is simulated.
 
@@ -71,8 +72,7 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
     upper, lower = n_c1[:, possible] if "mu" in model.parameters else np.zeros((2, len(possible)))
     surface = model.variant.surface if model.variant else ELLIPSOID
     theirs = {name: values[possible] for name, values in columns.items()}
-    with np.errstate(divide="ignore", invalid="ignore"):  # where no upright spin is steady
-        time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
+    time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
     return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}
 
 

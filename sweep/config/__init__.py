@@ -258,4 +258,4 @@ def _longest(time: float, in_si: Mapping[str, tuple[float, ...]]) -> float:
         return time
     longest = time * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
     # A whole number of stretches, so that the steps do not depend on the limit (`sweep.kernels.kernel.STRETCH`).
-    return float(STRETCH * ceil(min(longest, schema.LATEST) / STRETCH))
+    return float(STRETCH * max(ceil(min(longest, schema.LATEST) / STRETCH), 1))

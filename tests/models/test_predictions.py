@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import columns
 
+import sweep
 from sweep.models import MODELS
 from sweep.models.general.rigid_body import slower_period
 from sweep.models.ladder import analytic, slip
@@ -83,3 +84,15 @@ def test_best_shape_maximises_the_form_factor() -> None:
     assert b[factor.argmax()] == pytest.approx(analytic.best_b(10.0), abs=1e-3)
     assert round(analytic.best_b(10.0), 1) == 4.4  # the paper's «approximately 4.4»
     assert np.isnan(analytic.best_b(3.0))
+
+
+@pytest.mark.parametrize("model", ["slip", "analytic", "averaged", "slow"])
+@pytest.mark.parametrize("extreme", [{"c": 1e-20, "n0": 1e-300}, {"mu": 1e-300}])
+def test_extreme_numbers_are_predicted_without_a_warning(model: str, extreme: dict[str, float]) -> None:
+    sweep.predict({"model": model, "friction": {"mu": 60}}, **extreme)
+
+
+@pytest.mark.parametrize("model", ["slip", "analytic", "averaged", "slow"])
+def test_a_body_that_is_hardly_there_is_refused(model: str) -> None:
+    with pytest.raises(sweep.ConfigError, match="differ by a factor of more than"):
+        sweep.load_config({"model": model, "friction": {"mu": 60}}, {"c": 1e-300})

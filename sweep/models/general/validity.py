@@ -12,6 +12,9 @@ from sweep.models.model import Array, Columns
 
 _ROUNDING = 1e-12
 
+_FLATTEST = 1e30
+"""Ratio of semi-axes up to which no power of it in the equations overflows."""
+
 
 def impossible(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
     """Find the bodies that are impossible or cannot stand, shape (cells,)."""
@@ -20,6 +23,8 @@ def impossible(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
 
 def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Array, str]]:
     """Yield each possible fault: the bodies that have it, shape (cells,), and a sentence on what to do."""
+    flat = np.maximum(columns["a"], columns["b"]) > _FLATTEST * columns["c"]
+    yield flat, f"semi-axes differ by a factor of more than {_FLATTEST:.0e}; check their units"
     yield surface.outside(columns), f"centre of mass outside {surface.interior}"
     moments = np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inertia(columns)))
     yield moments[:, 0] <= 0, "matrix of inertia not positive definite; all three principal moments must be positive"
@@ -28,7 +33,8 @@ def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Arr
         largest > (least + middle) * (1 + _ROUNDING),
         "no body has such moments of inertia; none of the principal ones may exceed the sum of the other two",
     )
-    k1, k2 = rigid_body.stiffness(columns, surface)
+    with np.errstate(over="ignore"):  # infinitely stiff is stable
+        k1, k2 = rigid_body.stiffness(columns, surface)
     yield (
         np.minimum(k1, k2) <= 0,
         f"upright rest is not stable; keep the centre of mass below both centres of curvature, {surface.bounds}",

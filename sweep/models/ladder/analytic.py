@@ -9,6 +9,7 @@ from sweep.models.model import COUNT, FORMULAS, Array, Columns, Tier
 from sweep.models.theory.coefficients import coefficients
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def critical_spins(columns: Columns) -> tuple[Array, Array]:
     """n_c1+ and n_c1-, in sqrt(g/c), each of shape (cells,): between them both modes of the rattle decay.
 
@@ -17,8 +18,7 @@ def critical_spins(columns: Columns) -> tuple[Array, Array]:
     rattle (δ = 0 or a = b), without friction, and for a body that cannot stand.
     """
     k = coefficients(columns)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first, second = k.m1 / k.k1, -k.m4 / k.k4
+    first, second = k.m1 / k.k1, -k.m4 / k.k4
     exists = np.isfinite(first) & np.isfinite(second) & ~impossible(columns)
     rate = np.sqrt(columns["c"])
     upper = np.where(exists, np.maximum(first, second) / rate, np.nan)

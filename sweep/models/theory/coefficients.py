@@ -21,6 +21,7 @@ and nu2, the frequencies of the X and Y modes (nu1, nu2, but without the paper's
 """
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")  # no friction; bodies that are hardly there
 def coefficients(columns: Columns) -> Coefficients:
     """Coefficients for the bodies in `columns`, which need a, b, c, delta and mu."""
     c = columns["c"]
@@ -47,11 +48,9 @@ def coefficients(columns: Columns) -> Coefficients:
     k2 = nu2_sq * (f * sin**2 + cos**2 / f)
     k3 = nu1_sq * (f * cos**2 + sin**2 / f)
     k4 = -nu2_sq * sin * cos * (f - 1 / f)
-    with np.errstate(divide="ignore"):
-        slip = f / (J2 * mu)
+    slip = f / (J2 * mu)
     m1, m4 = slip * nu1_sq / nu2_sq * k2, slip * nu2_sq / nu1_sq * k3
-    with np.errstate(invalid="ignore"):
-        m2, m3 = slip * k4, slip * k1
+    m2, m3 = slip * k4, slip * k1
     return Coefficients(
         p, q, s, (a2 + b2) / 5, J1, J2, theta, np.sqrt(nu1_sq), np.sqrt(nu2_sq), f,
         k1, k2, k3, k4, m1, m2, m3, m4,
