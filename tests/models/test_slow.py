@@ -7,8 +7,10 @@ import pytest
 
 import sweep
 from sweep.models.ladder import slip
+from sweep.models.slow import follow
 from sweep.models.slow import foresee as slow
-from sweep.models.slow.exchange import TERMS, make_exchange
+from sweep.models.slow.exchange import RESONANT, SECOND, TERMS, THIRD, make_exchange
+from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory import linear
 from sweep.plots import quantities
 from sweep.prediction import predict
@@ -139,3 +141,67 @@ def test_counts_are_not_foreseen_for_critical_spins_alone() -> None:
     config = sweep.load_config(LINE | {"model": "slow"})
     assert "reversals_foreseen" not in predict(config.tier, config.grid).variables
     assert "reversals_foreseen" in predict(config.tier, config.grid, config.measure).variables
+
+
+@pytest.mark.parametrize("b", [3.0, 6.4])
+def test_orders_of_the_corrections(b: float) -> None:
+    """What the full equations leave over at rest falls as the third and fourth power of the amplitude without T and Q,
+    and as the fifth and sixth with them.  The ripple and w are found here by fits to tiny amplitudes, mode by mode.
+    """
+    p = slip.MODEL.constants.of(columns(b=b))
+    rates, modes = slow._modes_at_rest(slip.MODEL, p)
+    E, p = slow._of_unit_energy(slip.MODEL, p, modes)[0], type(p)(*(each[0] for each in p))
+    inverse, exchange = np.linalg.inv(E), make_exchange(slip.MODEL)[0]
+    energies = [(1, 0, 1, 0), (0, 1, 0, 1), (1, 0, 0, 1), (0, 1, 1, 0)]
+    even = np.concatenate([SECOND, SECOND[:, [2, 3, 0, 1]], energies])
+    odd = np.concatenate([THIRD, THIRD[:, [2, 3, 0, 1]], np.eye(4, dtype=int)])
+    turning = np.array([*rates[0, :2], *rates[0, :2].conj()])
+    unit = np.exp(2j * np.pi / 16 * np.array(np.divmod(np.arange(256), 16)))
+
+    def products(powers: np.ndarray, a: np.ndarray) -> np.ndarray:
+        return np.prod(np.concatenate([a, a.conj()]) ** powers[:, :, None], axis=1)
+
+    def fitted(values: np.ndarray, powers: np.ndarray) -> np.ndarray:
+        return np.linalg.lstsq(products(powers, tiny).T, values.T)[0].T
+
+    def slopes(a: np.ndarray, q: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Rates of the modes, and -n', shape (7, points)."""
+        x = 2 * (E[:, :2] @ a + E @ w @ products(THIRD, a)).real
+        found = slip.MODEL.rhs((*x[:4], 2 * (q @ products(SECOND, a)).real, *x[4:]), p)[0]
+        return np.concatenate([inverse @ np.array(found)[list(RATTLE)], found[4:5]])
+
+    tiny, none = 1e-4 * np.hstack([unit, unit * [[1], [0.5]], unit * [[0.5], [1]]]), np.zeros((6, len(THIRD)))
+    turned = fitted(slopes(tiny, np.zeros(3), none)[6], even)
+    q, n_rate = turned[:3] / (SECOND @ turning), -(turned[6:] @ products(even[6:], tiny)).real
+
+    def bent(spin: float) -> np.ndarray:
+        """1 + Y, for which the rocking modes at a spin are E (1 + Y)."""
+        found = inverse @ np.linalg.eig(linear.jacobian(slip.MODEL, p, np.full(1, spin))[0])[1]
+        rocking = found[:, np.argsort(-np.abs(found[:2]).sum(axis=0))[:2]]
+        return rocking @ np.linalg.inv(rocking[:2])
+
+    Y_rate = (bent(1e-4) - bent(-1e-4)) / 2e-4
+    f = fitted(slopes(tiny, q, none)[:6] - Y_rate @ (n_rate * tiny), odd)[:, : len(THIRD)]
+    f[:2, :RESONANT] = 0  # these are the terms of T
+    at_rest = np.diag(inverse @ linear.jacobian(slip.MODEL, p, np.zeros(1))[0] @ E)
+    w = f / (THIRD @ turning - at_rest[:, None])
+
+    def left_over(size: float) -> np.ndarray:
+        table, kappa, a = np.empty((5, TERMS), complex), np.empty(2), size * unit
+        exchange(p, E, inverse, 1.02 * np.sqrt(2) * size, table, kappa)
+        e1, e2, beat, true = abs(a[0]) ** 2, abs(a[1]) ** 2, a[0] * a[1].conj(), slopes(a, q, w)
+        found = []
+        for share in (1e-12, 1.0):
+            by = (1 + np.outer(kappa, e1 + e2)) / share
+            C = follow._rates(table[0], by[0], e1, e2, beat)
+            rests = true[0] - C[0] * a[0] - C[1] * a[1], true[1] - C[2] * a[0] - C[3] * a[1]
+            turned = true[6] + follow._turning(table[0], by[1], e1, e2, beat)
+            found.append([abs(np.mean(rest * each.conj())) for rest, each in zip(rests, unit, strict=True)])
+            found[-1].append(abs(turned.mean()))
+        return np.array(found)
+
+    sizes = 0.04 / 2.0 ** np.arange(4)
+    orders = np.log2(np.array([left_over(size) for size in sizes]))
+    orders = orders[:-1] - orders[1:]
+    print(f"b = {b}\n{orders.round(2)}")
+    np.testing.assert_allclose(orders[-1], [[3, 3, 4], [5, 5, 6]], atol=0.15)
