@@ -17,7 +17,7 @@ from sweep.engine.reporter import Reporter
 from sweep.engine.run import run
 from sweep.faults import fault_of
 from sweep.grid import Array
-from sweep.models.model import MODES
+from sweep.models.model import ENDING
 from sweep.prediction import foreseen
 from sweep.studies.search import measuring, require_certain
 
@@ -80,8 +80,8 @@ def _cell(config: Config) -> dict[str, float]:
     if config.grid.size > 1:
         name = next(name for name, values in {**config.axes, **config.cases}.items() if len(values) > 1)
         raise ConfigError([config.fault(config.table[name].place, "has several values; give a single one")])
-    if MODES not in config.equations.offers:
-        message = "has no foreseen counts; choose viscous friction without couples"
+    if ENDING not in config.equations.offers:
+        message = "has no foreseen counts; choose viscous friction"
         raise ConfigError([config.fault(("model",), message)])
     return {name: float(column[0]) for name, column in config.grid.columns().items()}
 

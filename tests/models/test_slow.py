@@ -15,6 +15,7 @@ from sweep.models.theory import linear
 from sweep.plots import quantities
 from sweep.prediction import predict
 
+MEASURE = ["reversals", "margin", "foreseen"]
 LINE: dict[str, Any] = {"body": {"b": {"start": 1.5, "stop": 9.5, "num": 9}}, "friction": {"mu": [30, 80, 150]}}
 
 
@@ -72,6 +73,24 @@ def test_counts_of_hard_cells(given: dict[str, float], what: str) -> None:
     case = {name: values.tolist() for name, values in columns(**given).items()}
     found = sweep.run({"cases": case, "measure": ["reversals", "foreseen"], "integrator": {"method": "auto"}})
     assert found.reversals_foreseen == found.reversals, what
+
+
+@pytest.mark.parametrize("sigma", [1e-3, 1e-2, 0.1])
+def test_counts_of_a_body_that_a_couple_slows(sigma: float) -> None:
+    """It reverses less often the stronger the couple is."""
+    friction = {"mu": [30, 80, 150], "sigma": sigma}
+    found = sweep.run(LINE | {"friction": friction, "start": {"n0": 0.05}, "measure": MEASURE})
+    decided, right = found.decided == 1, found.reversals == found.reversals_foreseen
+    assert float(right.where(decided).mean()) > 0.85
+    assert float(right.where(decided & (found.foreseen_sure == 1)).mean()) == 1
+    assert float(found.foreseen_sure.mean()) > 0.3
+
+
+def test_a_couple_makes_a_count_unsure_that_a_small_mode_decides() -> None:
+    """The spin falls below the critical one while the mode that would reverse it is still tiny; it is foreseen to."""
+    found = sweep.run({"body": {"b": 4.2}, "friction": {"mu": 109.0909, "sigma": 1e-3}, "start": {"n0": 0.02},
+                       "measure": MEASURE})  # fmt: skip
+    assert (found.reversals, found.reversals_foreseen, found.foreseen_sure) == (2, 3, 0)
 
 
 def test_a_cell_is_the_same_alone_and_mirrored() -> None:

@@ -57,7 +57,7 @@ def test_a_body_in_si_changes_alike() -> None:
     ("change", "words"),
     [
         ({"mu": [60, 70]}, "mu: has several values"),
-        ({"sigma": 0.01}, "has no foreseen counts"),
+        ({"friction": {"law": "coulomb", "mu": 0.2, "speed": 0.01}}, "has no foreseen counts"),
         ({"model": "slow"}, "is not simulated"),
         ({"reversals": 0}, "reversals: must not be 0"),
         ({"n0": {"normal": [0.05, 0.01]}}, "is a distribution"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.model import MODES
+from sweep.models.model import ENDING
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
@@ -13,7 +13,7 @@ class Foreseen(Measurement):
 
     name = "foreseen"
     summary = "reversals by the slow equations, without the oscillations, and whether they are sure"
-    asks = MODES
+    asks = ENDING
     variables = {
         "reversals_foreseen": Variable(
             "int16", NUMBER, "spin reversals, foreseen", "Spin reversals by the slow equations of the `slow` model."

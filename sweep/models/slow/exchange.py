@@ -17,6 +17,9 @@ them.
 The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory
 reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
 T and Q are divided by 1 + κ |a|², with one κ for each.
+
+A couple adds -d n to n', where d does not depend on the spin.  C and the ripple then follow the spin as if it stood
+still, which leaves out terms of the order of d in units of a frequency.
 """
 
 from __future__ import annotations
@@ -255,12 +258,18 @@ def _fill(A, D, M):
 
 
 def make_exchange(model: Model):
-    """Compiled (p, E, E⁻¹, reach, table, bent) -> None, which writes the coefficients of a body, and `begin`.
+    """Compiled (p, E, E⁻¹, reach, table, bent) -> d, which writes the coefficients of a body, and `begin`.
 
     `table`, of shape (5, TERMS), gets those of the polynomials in n / `reach`, of fourth degree for C and H and of
     second degree for T and Q; and `bent` the two κ.
     """
-    rhs = model.rhs
+    rhs, couples = model.rhs, bool(model.variant and model.variant.couples)
+
+    @called
+    def slowed(n, p):
+        """ω3' in upright spin, by couples alone."""
+        rates, _ = rhs((0.0, 0.0, 0.0, 0.0, -n, 0.0, 0.0), p)
+        return rates[4]
 
     @called
     def jacobian(n, p, E, inverse, A):
@@ -296,6 +305,8 @@ def make_exchange(model: Model):
         for i in range(first, last):
             rates, _ = rhs((x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] - n, x[5, i], x[6, i]), p)
             slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], slopes[4, i], slopes[5, i], slopes[6, i] = rates
+            if couples:
+                slopes[4, i] -= slowed(n, p)
         share, sums = 1.0 / (last - first), np.zeros(2 * len(THIRD))
         _clear(odd)
         _resolve(slopes[4], _EVEN_TURNS, first, last, sums)
@@ -434,6 +445,7 @@ def make_exchange(model: Model):
             for k in range(_THREE):
                 for j in range(_THREE):
                     table[k, m] += straight * _FIT_OF_THREE[k, j] * sums[j, m]
+        return slowed(reach, p) / reach if couples else 0.0
 
     @called
     def begin(x, n, reach, p, E, inverse):

@@ -11,6 +11,7 @@ import numpy as np
 
 from sweep.jit import called, inline
 from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS
+from sweep.models.stiff.final_spin import lasts
 
 # A step turns the spin by no more than this share of what a mode can.  The rates, whose derivative by the spin is about
 # |H|, change the logarithm of an amplitude in a step by no more than `_CHANGE` compared with constant rates.
@@ -24,8 +25,9 @@ _BEAT, _ACTS = 1.0, 0.1
 # the spin. To resolve the old modes into the new ones would excite one by the other, which the motion does not do.
 _APART_STEP = 3.0
 
-# It is over when both modes decay and can change the spin by no more than this share.
-_OVER, _MOST_STEPS = 1e-3, 3000
+# It is over when both modes decay and can change the spin by no more than this share; a couple slows the spin by no
+# more than a share `_SLOWED` in a step.
+_OVER, _MOST_STEPS, _SLOWED = 1e-3, 3000, 0.1
 
 # The equations have failed if the spin exceeds what the energy allows by this factor.
 _FAR = 3.0
@@ -130,12 +132,12 @@ def _means(z1, z2, turn1, turn2, after1, after2, V):
 
 
 @called
-def follow(a1, a2, n, table, bent, reach, size):
+def follow(a1, a2, n, table, bent, d, reach, size):
     """Follow the slow equations from (a_1, a_2, n).
 
     Parameters
     ----------
-    table, bent, reach : the coefficients of `sweep.models.slow.exchange`
+    table, bent, d, reach : the coefficients of `sweep.models.slow.exchange`
     size : factor of T and Q, 1 but for a test of how much depends on them
 
     Returns
@@ -165,12 +167,13 @@ def follow(a1, a2, n, table, bent, reach, size):
         count, old = count + (new * old < 0.0), new
         turn1, turn2, cross = abs(g1) * f1, abs(g2) * f2, 2.0 * abs(g12) * np.sqrt(f1 * f2)
         left = 0.5 * turn1 / abs(r1) + 0.5 * turn2 / abs(r2) + cross / abs(rate1 + np.conj(rate2))
-        if r1 < 0.0 and r2 < 0.0 and left < _OVER * abs(n):
+        lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
+        if r1 < 0.0 and r2 < 0.0 and others + cross / abs(rate1 + np.conj(rate2)) < _OVER * lasting:
             return count, True
         way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(abs(g1), abs(g2), _TINY))
         step = min(_until(way, turn1, r1), _until(way, turn2, r2))
         step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
-        step = min(step, _CHANGE / (max(abs(g1), abs(g2)) * min(way, left) + _TINY))
+        step = min(step, _CHANGE / (max(abs(g1), abs(g2)) * min(way, left) + _TINY), _SLOWED / (d + _TINY))
         acts = 2.0 * strong * np.sqrt(f1 * f2)
         if acts > _ACTS * apart:
             step = min(step, _BEAT / (apart + acts))
@@ -179,6 +182,7 @@ def follow(a1, a2, n, table, bent, reach, size):
         after1, after2 = np.exp(turned1), np.exp(turned2)
         e1, e2, beat = _means(z1, z2, turned1, turned2, after1, after2, V)
         middle = n + 0.5 * step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
+        middle *= np.exp(-0.5 * d * step)
         e1, e2, beat = _means(z1, z2, 2.0 * turned1, 2.0 * turned2, after1 * after1, after2 * after2, V)
         _at(table, middle / reach, sums)
         rate1, rate2, W = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
@@ -187,6 +191,7 @@ def follow(a1, a2, n, table, bent, reach, size):
         after1, after2 = np.exp(step * rate1), np.exp(step * rate2)
         e1, e2, beat = _means(z1, z2, step * rate1, step * rate2, after1, after2, V)
         n += step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
+        n *= np.exp(-d * step)
         z1, z2 = z1 * after1, z2 * after2
         if not abs(n) < _FAR * reach:
             break

@@ -42,7 +42,7 @@ class Foreseen(NamedTuple):
 
 
 def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
-    """Count the reversals of trajectories by the slow equations of `model`, which has two rocking modes (`MODES`).
+    """Count the reversals of trajectories by the slow equations of `model`, which has two rocking modes (`ENDING`).
 
     Without `check`, no count is sure, and it takes a third of the time.
     """
@@ -101,11 +101,14 @@ def compiled_foresee(model: Model) -> Cached:
         table, bent = np.empty((5, TERMS), E.dtype), np.empty(2)
         for i in range(len(rows)):
             p, spin, reach = load(rows[i]), rows[i, n], rows[i, n + 1]
-            exchange(p, E[i], inverse[i], reach, table, bent)
+            d = exchange(p, E[i], inverse[i], reach, table, bent)
             a1, a2, spin = begin(rows[i, n + 2 :], spin, reach, p, E[i], inverse[i])
-            count, over = follow(a1, a2, spin, table, bent, reach, 1.0)
-            sure = check and over and follow(a1, a2, spin, table, bent, reach, _LESS)[0] == count
-            sure = sure and follow(a1, a2, spin, table, bent, reach, _MORE)[0] == count
+            count, over = follow(a1, a2, spin, table, bent, d, reach, 1.0)
+            sure = check and over
+            for size in (_LESS, _MORE):
+                sure = sure and follow(a1, a2, spin, table, bent, d, reach, size)[0] == count
+                if d > 0.0:
+                    sure = sure and follow(a1, a2, spin, table, bent, d * size, reach, 1.0)[0] == count
             found[i, 0], found[i, 1] = count, 1.0 if sure else 0.0
 
     return serial(run, "(f8[:, ::1], c16[:, :, ::1], c16[:, :, ::1], b1, f8[:, ::1])", f"foreseen-{model.key}")

@@ -115,7 +115,7 @@ def _change(e, r, s, d, step):
 
 
 @called
-def _lasts(n, r, d, left0, left1):
+def lasts(n, r, d, left0, left1):
     """Sizes of the most slowly decaying term of the spin, and of the others together."""
     if d < min(-2.0 * r[0], -2.0 * r[1]):
         return abs(n), abs(left0) + abs(left1)
@@ -149,7 +149,7 @@ def _follow(spin: Array, log_e: Array, rates: Array, slopes: Array, slowing: Arr
             r, s, e0, e1 = _at(rates[i], n), _at(slopes[i], n), np.exp(log0), np.exp(log1)
             left0 = s[0] * e0 / (2.0 * r[0] + d) if s[0] * e0 != 0.0 else 0.0
             left1 = s[1] * e1 / (2.0 * r[1] + d) if s[1] * e1 != 0.0 else 0.0
-            lasting, others = _lasts(n, r, d, left0, left1)
+            lasting, others = lasts(n, r, d, left0, left1)
             over = (r[0] < 0.0) & (r[1] < 0.0) & (others < _OVER * lasting)
             if over:
                 after = n + left0 + left1 if d == 0.0 else n
