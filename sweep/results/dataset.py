@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.grid import CASE, SAMPLE, Array, Grid
 from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
@@ -185,7 +185,7 @@ def check_names(config: Config, series: Iterable[str] = ()) -> None:
     names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
-        raise ConfigError([config.fault(("model",), words)])
+        raise config.error(("model",), words)
 
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:

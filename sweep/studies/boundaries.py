@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.axis import Axis, contours
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.kernels.status import TIME_LIMIT
@@ -51,7 +51,7 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     """Return the axes over which boundaries are curves: the named ones, or else the first two."""
     require_certain(config)
     if COUNT not in config.equations.offers:
-        raise ConfigError([config.fault(("model",), "does not count reversals, so it has no boundaries")])
+        raise config.error(("model",), "does not count reversals, so it has no boundaries")
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in long:
@@ -61,7 +61,7 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     up = y or next(rest, None)
     right = x or next(rest, None)
     if up is None or right is None or up == right:
-        raise ConfigError([config.fault((), "boundaries need two axes; give two parameters more than one value")])
+        raise config.error((), "boundaries need two axes; give two parameters more than one value")
     return right, up
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import run
 from sweep.faults import fault_of
@@ -61,7 +61,7 @@ def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
     cell = _cell(config)
     now = int(_counts(config, {name: np.array([value]) for name, value in cell.items()}, reporter)[0])
     if now < 0:
-        raise ConfigError([config.fault((), "the count of this body is not decided; see `decided` of a run")])
+        raise config.error((), "the count of this body is not decided; see `decided` of a run")
     brackets = _foreseen(config, cell, reversals)
     while wide := {name: each.places() for name, each in brackets.items() if each.wide}:
         columns = {name: np.tile(value, (len(wide), _TOGETHER)) for name, value in cell.items()}
@@ -79,10 +79,9 @@ def _cell(config: Config) -> dict[str, float]:
     require_certain(config)
     if config.grid.size > 1:
         name = next(name for name, values in {**config.axes, **config.cases}.items() if len(values) > 1)
-        raise ConfigError([config.fault(config.table[name].place, "has several values; give a single one")])
+        raise config.error(name, "has several values; give a single one")
     if MODES not in config.equations.offers:
-        message = "has no foreseen counts; choose viscous friction without couples"
-        raise ConfigError([config.fault(("model",), message)])
+        raise config.error(("model",), "has no foreseen counts; choose viscous friction without couples")
     return {name: float(column[0]) for name, column in config.grid.columns().items()}
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Values
+from sweep.config import Config, Values
 from sweep.grid import Array
 from sweep.models.model import Columns
 from sweep.models.theory.stability import SPIN_LIMIT
@@ -48,13 +48,11 @@ def searchable(config: Config) -> Config:
     """Return `config` with a single start spin, which has no influence; raise a `ConfigError` if it is unsuitable."""
     require_certain(config)
     if not config.of_rattlebacks:
-        raise ConfigError([config.fault(("model",), "not a rattleback; choose the model slip or noslip")])
+        raise config.error(("model",), "not a rattleback; choose the model slip or noslip")
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
-        raise ConfigError([config.fault(("start", beyond[0]), "cannot be an axis of critical spins; give one number")])
+        raise config.error(beyond[0], "cannot be an axis of critical spins; give one number")
     if "n0" not in config.tier.parameters:
-        raise ConfigError(
-            [config.fault(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")]
-        )
+        raise config.error(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")
     parameters = config.parameters | {"n0": Values.one(0.0)}
     cases = {name: v for name, v in config.cases.items() if name != "n0"}
     found = replace(measuring(config), parameters=parameters, cases=cases)

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
-from sweep.config import Config, ConfigError, Values
+from sweep.config import Config, Values
 from sweep.config.cross_checks import misplaced, unlike
 from sweep.config.film import Film
 from sweep.ended import ended
@@ -97,7 +97,7 @@ def fit(
         raise fault_of(f"{len(sought)} parameters are free, and the film has {len(film.time)} rows; free fewer")
     ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
-        raise ConfigError([config.fault(("start", "x0"), f"the range of a free parameter is too wide: {off}")])
+        raise config.error("x0", f"the range of a free parameter is too wide: {off}")
     with blamed(config.origin):
         problem = Problem(config, film, sought, _countable(film))
         _check_length(problem)
@@ -152,10 +152,9 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
             message = f"{brief(name)} is not a parameter of the {config.tier.name} model{suggestion(name, known)}"
             raise fault_of(f"{message}; these can be free: {', '.join(known)}")
     if config.cases:
-        raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit takes a single body")])
+        raise config.error(("cases",), "cannot be fitted; a fit takes a single body")
     if more := [name for name in config.axes if name not in free]:
-        place = config.table[more[0]].place
-        raise ConfigError([config.fault(place, "has several values; make it free, or give one value")])
+        raise config.error(more[0], "has several values; make it free, or give one value")
     return config
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.config.distributions import chances
 from sweep.engine.whole import Whole
 from sweep.grid import Array
@@ -55,13 +55,11 @@ def designed(config: Config) -> Config:
     """
     require_simulated(config)
     if not config.samples:
-        message = "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}"
-        raise ConfigError([config.fault((), message)])
-    if config.axes:
-        name = next(iter(config.axes))
-        raise ConfigError([config.fault(config.table[name].place, "cannot be an axis of indices; give one number")])
+        raise config.error((), "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}")
+    for name in config.axes:
+        raise config.error(name, "cannot be an axis of indices; give one number")
     if not any(name in each.variables for each in chosen(config.measure) for name in QUANTITIES):
-        raise ConfigError([config.fault(("measure",), "has no quantity that indices are computed of; add reversals")])
+        raise config.error(("measure",), "has no quantity that indices are computed of; add reversals")
     known = config.distributions
     first, second = np.split(chances(2 * len(known), 1 << (config.samples - 1).bit_length(), config.seed), 2, axis=1)
     mixed = [np.where(np.arange(len(known)) == i, second, first) for i in range(len(known))]

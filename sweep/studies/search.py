@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.engine.errors import ROUND_OFF
 from sweep.engine.whole import Whole
 from sweep.faults import either, fault_of, quote
@@ -44,15 +44,13 @@ def require_certain(config: Config) -> None:
     """Raise a `ConfigError` if the model is not simulated, or a parameter is a distribution."""
     require_simulated(config)
     for name in config.distributions:
-        words = "is a distribution, which only run can sample; give a number or an axis here"
-        raise ConfigError([config.fault(config.table[name].place, words)])
+        raise config.error(name, "is a distribution, which only run can sample; give a number or an axis here")
 
 
 def require_simulated(config: Config) -> None:
     """Raise a `ConfigError` if the model is not simulated."""
     if not config.simulated:
-        message = f"the {config.model} model is not simulated; choose {either(MODELS)}"
-        raise ConfigError([config.fault(("model",), message)])
+        raise config.error(("model",), f"the {config.model} model is not simulated; choose {either(MODELS)}")
 
 
 def require_between(option: str, value: float, ends: tuple[float, float]) -> None:
