@@ -73,11 +73,7 @@ def _advance(lives: Lives, rows: Array, blocks: int) -> int:
 
 
 def execute(
-    kernel: Kernel,
-    images: Array,
-    *,
-    after_chunk: Callable[[], None] = lambda: None,
-    chunk_blocks: int | None = None,
+    kernel: Kernel, images: Array, *, after_chunk: Callable[[], None] = lambda: None, chunk_blocks: int | None = None
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
 

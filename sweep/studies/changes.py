@@ -19,7 +19,7 @@ from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.models.model import MODES
 from sweep.prediction import foreseen
-from sweep.studies.search import measuring, require_certain
+from sweep.studies.study import measuring, require_certain
 
 # Each parameter is scanned from half of its value to twice as much, in steps of 0.7 %.
 _FACTOR, _PLACES = 2.0, 201

@@ -18,8 +18,7 @@ from sweep.grid import Array
 from sweep.kernels.measures import chosen
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
-from sweep.studies.search import require_simulated
-from sweep.studies.study import Task
+from sweep.studies.study import Task, require_simulated
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
@@ -79,12 +78,10 @@ class Indices(Whole):
         values = np.stack([np.where(failed, np.nan, arrays[name]) for name in names])
         parameters = list(self.config.cases)
         found = estimated(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
-        attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size)}
-        return xr.Dataset(
-            variables(VARIABLES, ("quantity", "parameter"), found),
-            {"quantity": names, "parameter": parameters},
-            attributes | {"trajectories": self.grid.size},
-        )
+        title, size = f"{self.config.name}: Sobol indices", self.grid.size
+        attributes = {"title": title, **self._attributes(size), "trajectories": size}
+        labelled = variables(VARIABLES, ("quantity", "parameter"), found)
+        return xr.Dataset(labelled, {"quantity": names, "parameter": parameters}, attributes)
 
 
 def estimated(values: Array, seed: int) -> dict[str, Array]:

@@ -41,7 +41,7 @@ from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.kind import TRAJECTORY
 from sweep.results.provenance import provenance
-from sweep.studies.search import require_simulated
+from sweep.studies.study import require_simulated
 from sweep.units import Unit, named
 from sweep.variables import Variable
 
@@ -220,13 +220,11 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     steps = integrator.t_end / steps_of(integrator.method, chosen, columns)[0]
     samples = (integrator.t_end / intervals(chosen.equations, columns)).sum()
     seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
-    return "\n".join(
-        [
-            f"trajectories: {len(steps)}",
-            f"steps:        at most {steps.sum():.3g}",
-            f"samples:      at most {samples:.3g}",
-            f"time:         at most about {duration(seconds)}",
-        ]
+    return (
+        f"trajectories: {len(steps)}\n"
+        f"steps:        at most {steps.sum():.3g}\n"
+        f"samples:      at most {samples:.3g}\n"
+        f"time:         at most about {duration(seconds)}"
     )
 
 
