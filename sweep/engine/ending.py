@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.engine.cells import Cells
-from sweep.engine.lives import RUN, Lives
+from sweep.engine.cells import RUN, Cells, Lives
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK

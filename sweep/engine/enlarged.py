@@ -24,9 +24,8 @@ from sweep.models.model import Model
 from sweep.parameters import Parameter, sections
 from sweep.results import dataset
 from sweep.results.dataset import ROWS
-from sweep.results.identity import Identity
 from sweep.results.netcdf import open_dataset
-from sweep.results.provenance import identify
+from sweep.results.provenance import Identity, identify
 from sweep.results.store import Store
 
 RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}

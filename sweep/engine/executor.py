@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sweep.engine.lives import DONE, Lives
+from sweep.engine.cells import DONE, Lives
 from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.jit import threads

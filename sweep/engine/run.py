@@ -30,9 +30,8 @@ from sweep.plots import quantities
 from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
-from sweep.results.identity import Identity, not_resumed
 from sweep.results.netcdf import open_dataset
-from sweep.results.provenance import identify
+from sweep.results.provenance import Identity, identify, not_resumed
 from sweep.results.store import Running, Store, StoreError
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from sweep.results import netcdf
-from sweep.results.identity import Identity
+from sweep.results.provenance import Identity
 from sweep.results.store import StoreError
 from sweep.results.writing import remove_unfinished, replacing, require_writable
 

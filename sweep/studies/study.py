@@ -31,9 +31,8 @@ from sweep.models.user.blame import blamed
 from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
-from sweep.results.identity import require_same
 from sweep.results.kind import ATTRIBUTE
-from sweep.results.provenance import identify
+from sweep.results.provenance import identify, require_same
 from sweep.results.store import Store
 
 if TYPE_CHECKING:
