@@ -30,12 +30,10 @@ ERRORS = (
 )  # fmt: skip
 """What the last companion showed (`sweep.engine.errors.Errors`)."""
 
-NOTES = Layout(
-    (
-        "stage", "leg", "wary", "most", "step", "step_rule", "halvings", "brief", "step_before", *MET,
-        "repeats", "most_error", *ERRORS,
-    )
-)  # fmt: skip
+NOTES = Layout((
+    "stage", "leg", "wary", "most", "step", "step_rule", "halvings", "brief", "step_before", *MET,
+    "repeats", "most_error", *ERRORS,
+))  # fmt: skip
 """The notes on each cell. `leg`, `wary` and `most` belong to `sweep.engine.ending`; `halvings`, `brief`, `step_before`
 and what was met belong to `sweep.engine.failures`; the others belong to `sweep.engine.errors`."""
 

@@ -207,8 +207,6 @@ def blind(problem: Problem, best: Minimum) -> list[str]:
     tied = spread / np.outer(deviation, deviation)
     sentences += [
         f"{names[i]} and {names[j]} are known only in combination: their correlation is {tied[i, j]:.3f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(tied[i, j]) > _TIED
+        for i, j in np.argwhere(np.tril(np.abs(tied), -1) > _TIED)
     ]
     return sentences
