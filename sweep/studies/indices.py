@@ -12,7 +12,7 @@ import xarray as xr
 from scipy import stats
 
 from sweep.config import Config
-from sweep.config.distributions import chances
+from sweep.config.distributions import chances, drawn
 from sweep.engine.whole import Whole
 from sweep.grid import Array
 from sweep.kernels.measures import chosen
@@ -63,8 +63,7 @@ def designed(config: Config) -> Config:
     first, second = np.split(chances(2 * len(known), 1 << (config.samples - 1).bit_length(), config.seed), 2, axis=1)
     mixed = [np.where(np.arange(len(known)) == i, second, first) for i in range(len(known))]
     chance = np.concatenate([first, second, *mixed])
-    cases = {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
-    return replace(config, cases=cases, samples=len(chance))
+    return replace(config, cases=drawn(known, chance), samples=len(chance))
 
 
 class Indices(Whole):
