@@ -23,7 +23,7 @@ from sweep.engine.errors import results
 from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
 from sweep.engine.life import begin, live
 from sweep.engine.plan import plan, steps_of
-from sweep.engine.reporter import Progress, Reporter
+from sweep.engine.reporter import Count, Reporter
 from sweep.faults import duration, fault_of, refusal, suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
@@ -171,18 +171,13 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     (part,), (grid,) = job.parts, job.grids
     (each,), kernel, columns = begin([part]), part.kernel, grid.columns()
     images, steps = each.cells.images, part.step.copy()
-    t_end, began = chosen.integrator.t_end, time.perf_counter()
-
-    farthest = 0.0
+    t_end, count = chosen.integrator.t_end, Count(reporter, named(u.TIME, chosen.units) or "of time")
+    count.expect(len(images) * t_end, len(images) * t_end)
 
     def report() -> None:
-        nonlocal farthest
         table = kernel.table(images)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
-        farthest = max(farthest, float(covered))  # companions begin at t = 0 again
-        seconds = time.perf_counter() - began
-        unit = named(u.TIME, chosen.units) or "of time"
-        reporter.chunk(Progress(len(images) * t_end, farthest, 0, 0, seconds, unit))
+        count.chunk(float(covered), 0)  # companions begin at t = 0 again, which it leaves out
 
     marks = _run(each.cells, images, report)
     live([each], report)
@@ -196,7 +191,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     times = _times(kernel, images, every or intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, [each]))
-    made = provenance(chosen, time.perf_counter() - began, grid.size, of=TRAJECTORY)
+    made = provenance(chosen, time.perf_counter() - count.began, grid.size, of=TRAJECTORY)
     labelled = dataset.label(chosen, grid, found, made)
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(grid.size), {"long_name": "trajectory"})
