@@ -17,6 +17,8 @@ from sweep.engine.reporter import Reporter
 from sweep.engine.run import run
 from sweep.faults import fault_of
 from sweep.grid import Array
+from sweep.models.general import starts
+from sweep.models.general.surfaces import SURFACES
 from sweep.models.model import MODES
 from sweep.prediction import foreseen
 from sweep.studies.study import measuring, require_certain
@@ -93,17 +95,26 @@ def _foreseen(config: Config, cell: Mapping[str, float], reversals: int) -> dict
     for i, name in enumerate(names):
         columns[name][i] *= factors
     flat = {name: values.ravel() for name, values in columns.items()}
-    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"]
-    counts = np.where(config.equations.impossible(flat), -1, counts).reshape(columns[names[0]].shape)
+    # What cannot be run has the present count, as if it were the body itself.
+    possible = _possible(config, flat)
+    flat = {name: np.where(possible, values, cell[name]) for name, values in flat.items()}
+    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"].reshape(len(names), _PLACES)
     middle, brackets = _PLACES // 2, dict[str, _Bracket]()
     for i, name in enumerate(names):
-        allowed = np.array([config.table[name].allows(value) for value in columns[name][i]])
-        reached = np.flatnonzero(allowed & _reach(counts[i], counts[i, middle], reversals))
+        reached = np.flatnonzero(_reach(counts[i], counts[i, middle], reversals))
         if reached.size:
             nearest = reached[np.abs(reached - middle).argmin()]
-            far = cell[name] * factors[nearest] ** _FARTHER
-            brackets[name] = _Bracket(cell[name], far, int(counts[i, nearest]))
+            ends = cell[name] * factors[nearest] ** np.array([_FARTHER, 1.0])
+            there = _possible(config, {n: ends if n == name else np.full(2, value) for n, value in cell.items()})
+            brackets[name] = _Bracket(cell[name], float(ends[np.argmax(there)]), int(counts[i, nearest]))
     return brackets
+
+
+def _possible(config: Config, columns: Mapping[str, Array]) -> Array:
+    """Return which cells can be run: values within their bounds, a body that stands, and a start point on it."""
+    bounded = [np.vectorize(config.table[name].allows)(values) for name, values in columns.items()]
+    found = np.all(bounded, axis=0) & ~config.equations.impossible(columns)
+    return found & ~SURFACES[config.surface].off(columns, *starts.point(columns)) if "x0" in columns else found
 
 
 def _reach(counts: Array, now: int, reversals: int) -> Array:
