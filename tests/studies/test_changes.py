@@ -41,7 +41,7 @@ def test_the_nearest_change_is_found_and_none_is_made_up() -> None:
 
 
 def test_no_start_off_the_body_is_tried() -> None:
-    """At twice its distance, or on a body half as long, it would lie there; NumPy would warn of a root of less than 0."""
+    """At twice its distance, or on a body half as long, it would lie there, and NumPy would warn of a root."""
     found = sweep.changes(BODY, x0=6.0, reversals=-1)
     assert not (found.changed_at.sel(parameter="x0") > 10).any()
 
