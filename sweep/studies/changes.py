@@ -113,8 +113,8 @@ def _foreseen(config: Config, cell: Mapping[str, float], reversals: int) -> dict
 def _possible(config: Config, columns: Mapping[str, Array]) -> Array:
     """Return which cells can be run: values within their bounds, a body that stands, and a start point on it."""
     bounded = [np.vectorize(config.table[name].allows)(values) for name, values in columns.items()]
-    found = np.all(bounded, axis=0) & ~config.equations.impossible(columns)
-    return found & ~SURFACES[config.surface].off(columns, *starts.point(columns)) if "x0" in columns else found
+    off = SURFACES[config.surface].off(columns, *starts.point(columns)) if "x0" in columns else False
+    return np.asarray(np.all(bounded, axis=0) & ~config.equations.impossible(columns) & np.logical_not(off))
 
 
 def _reach(counts: Array, now: int, reversals: int) -> Array:
