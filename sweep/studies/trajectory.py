@@ -230,12 +230,10 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     """
     config = load_config(config, {} if samples is None else {"samples": samples})
     require_simulated(config)
-    config = replace(config, integrator=config.integrator.patient)
     method = METHODS.get(config.integrator.method)
-    if not (method and method.takes_every_step):
-        # A fixed step meant for another method may be unstable with dopri5.
-        plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
-        config = replace(config, integrator=plain)
+    # A fixed step meant for another method may be unstable with dopri5.
+    other = {} if method and method.takes_every_step else {"method": PLAIN, "step": "auto"}
+    config = replace(config, integrator=config.integrator.patient.model_copy(update=other))
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
     drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}
