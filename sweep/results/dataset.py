@@ -213,7 +213,7 @@ def variables(
 ) -> dict[str, xr.Variable]:
     """Return the variables of `specs` that `found` contains, along common dimensions."""
     return {
-        name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype), described(spec, system))
+        name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype, copy=False), described(spec, system))
         for name, spec in specs.items()
         if name in found
     }

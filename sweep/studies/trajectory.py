@@ -200,12 +200,10 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
 
 def _described(times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
     """Return the series over (trajectory, time), with their attributes, in the order of `SERIES`."""
-    own = {name: each for name, *each in model.series}
-    specs = {"time": (u.TIME, "time t"), **SERIES, **own}
-    words = {name: dataset.described(Variable("float64", *spec), system) for name, spec in specs.items()}
-    found: dict[str, Any] = {"time": ("time", times, words["time"])}
-    found |= {name: (("trajectory", "time"), series[name], words[name]) for name in words if name in series}
-    return xr.Dataset(found)
+    rows = {**SERIES, **{name: each for name, *each in model.series}}
+    specs = {name: Variable("float64", *row) for name, row in rows.items()}
+    time = xr.Variable("time", times, dataset.described(Variable("float64", u.TIME, "time t"), system))
+    return xr.Dataset(dataset.variables(specs, ("trajectory", "time"), series, system), {"time": time})
 
 
 def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> str:
