@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from sweep.explorer.server import Beside
     from sweep.plots.picture import plot
     from sweep.results.store import StoreError
-    from sweep.studies.predictions import predict
 
 __all__ = [
     "Config", "ConfigError", "StoreError", "animate", "boundaries", "changes", "critical", "explore", "fit", "indices",
@@ -41,7 +40,6 @@ HOMES = {
     "StoreError": "sweep.results.store",
     "load_config": "sweep.config",
     "plot": "sweep.plots.picture",
-    "predict": "sweep.studies.predictions",
 }
 """Modules of the public names that are not defined here."""
 
@@ -175,11 +173,10 @@ def boundaries(
     ('n0', 'mu')
     """
     from sweep.studies.boundaries import boundaries
-    from sweep.studies.study import run_study
 
     with _prepared(config, overrides, progress, reporter) as (checked, reporter):
         task = boundaries(checked, x, y, bracket, deviation)
-        return run_study(task, output, fresh=fresh, reporter=reporter, client=client)
+        return task.run(output, fresh=fresh, reporter=reporter, client=client)
 
 
 def changes(
@@ -265,10 +262,9 @@ def critical(
     '0.005'
     """
     from sweep.studies.critical import critical
-    from sweep.studies.study import run_study
 
     with _prepared(config, overrides, progress, reporter) as (checked, reporter):
-        return run_study(critical(checked, bracket), output, fresh=fresh, reporter=reporter, client=client)
+        return critical(checked, bracket).run(output, fresh=fresh, reporter=reporter, client=client)
 
 
 def trajectory(
@@ -502,10 +498,39 @@ def indices(
         as `run`; also if the model is not simulated, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
-    from sweep.studies.study import run_study
 
     with _prepared(config, overrides, progress, reporter) as (checked, reporter):
-        return run_study(indices(checked), output, fresh=fresh, reporter=reporter, client=client)
+        return indices(checked).run(output, fresh=fresh, reporter=reporter, client=client)
+
+
+def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
+    """Return the predictions of the paper and of the linear theory on the grid of `config`, without simulating.
+
+    If `first_reversal` is measured, the time of the first reversal is predicted as well.
+
+    Parameters
+    ----------
+    config : a configuration, a mapping with the contents of its file, or the path of a file
+    overrides : values that replace those of the file, such as ``mu=60``
+
+    Raises
+    ------
+    ConfigError
+        if the configuration cannot be used.
+
+    Examples
+    --------
+    >>> sweep.predict({"friction": {"mu": [60, 130]}}).reversals_predicted.values
+    array([3, 7], dtype=int16)
+    """
+    from sweep import prediction
+    from sweep.config import load_config
+    from sweep.results import dataset
+
+    register()
+    checked = load_config(config, overrides)
+    found = prediction.predict(checked.tier, checked.grid, checked.measure).variables
+    return dataset.label(checked, checked.grid, found, {"config": checked.label()})
 
 
 def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:

@@ -78,13 +78,11 @@ class Terminal(Reporter):
     @contextmanager
     def _compiling(self) -> Iterator[None]:
         """Show a message while something compiles, with a spinner if the terminal can show one."""
-        if self._bar is None and self.console.is_terminal:
-            with self.console.status(_COMPILING):
-                yield
-        else:
-            if not self._announced:
-                self.note(_COMPILING)
+        spins = self._bar is None and self.console.is_terminal
+        if not spins and not self._announced:
+            self.note(_COMPILING)
             self._announced = True
+        with self.console.status(_COMPILING) if spins else nullcontext():
             yield
 
     def note(self, message: str) -> None:

@@ -274,10 +274,7 @@ def _save(result: xr.Dataset, files: RunFiles) -> None:
 
 def _studied(task: Task, **how: Any) -> None:
     """Carry out a study and report the result, as `_written`."""
-    from sweep.studies import estimates
-    from sweep.studies.study import run_study
-
-    _written(task.config, task.verb, partial(run_study, task), partial(estimates.of, task), **how)
+    _written(task.config, task.verb, task.run, task.estimate, **how)
 
 
 def _written(

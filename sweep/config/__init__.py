@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from sweep import faults
 from sweep.config import cases, cross_checks, document, film, schema, user_models
 from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of, present
-from sweep.config.distributions import drawn
+from sweep.config.distributions import chances, drawn
 from sweep.config.document import plain_data
 from sweep.config.messages import explain
 from sweep.config.schema import Integrator
@@ -144,7 +144,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     uncertain = {n: v.distribution for n, v in given.items() if v.distribution and n in model.parameters}
     samples = values.samples or (schema.SAMPLES if uncertain else None)
     if samples and uncertain and values.cases is None:
-        columns = drawn(uncertain, samples, values.seed)
+        columns = drawn(uncertain, chances(len(uncertain), samples, values.seed))
     parameters = _parameters(model, given, columns, known, physics)
     rattleback = not origin or loading.law(origin) is not None
     numbers = {name: value.numbers for name, value in parameters.items()} | columns

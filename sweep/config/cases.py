@@ -79,9 +79,8 @@ def _checked(table: Mapping[str, Any], place: Place, known: Mapping[str, Paramet
     columns = {name: column for name, (column, _) in read.items()}
     if found := [place(path, message) for path, message in _wrong(columns, known)]:
         raise ConfigError(found)
-    return {name: tuple(map(float, column)) for name, column in columns.items()}, {
-        n: unit for n, (_, unit) in read.items()
-    }
+    units = {name: unit for name, (_, unit) in read.items()}
+    return {name: tuple(map(float, column)) for name, column in columns.items()}, units
 
 
 def _wrong(table: Mapping[str, Any], known: Mapping[str, Parameter]) -> Iterator[tuple[faults.Path, str]]:

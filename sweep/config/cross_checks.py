@@ -76,13 +76,8 @@ def of_all_cells(config: Config) -> Iterator[Misfit]:
     for name, way_out in (("refine", ", or set it to 0"), ("samples", " in all")):
         if getattr(config, name) and cells > MAX_CELLS_IN_MEMORY:
             yield (name,), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY}{way_out}"
-    for path, check in (
-        (("body",), impossible),
-        (("start", "x0"), misplaced),
-        (("integrator", "step"), _unusable_step),
-    ):
-        if reason := check(config):
-            yield path, reason
+    checks = {("body",): impossible, ("start", "x0"): misplaced, ("integrator", "step"): _unusable_step}
+    yield from ((path, reason) for path, check in checks.items() if (reason := check(config)))
 
 
 def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:

@@ -93,14 +93,11 @@ class Distribution:
         return float(self.at(np.array(0.5)))
 
 
-def drawn(known: Mapping[str, Distribution], number: int, seed: int) -> dict[str, tuple[float, ...]]:
-    """Draw samples of all parameters, each from its own distribution and independently.
+def drawn(known: Mapping[str, Distribution], chance: Array) -> dict[str, tuple[float, ...]]:
+    """Return samples of all parameters, each from its own distribution, at probabilities of shape (number, parameters).
 
-    Returns
-    -------
-    The values of each parameter, shape (number,).
+    They are independent if the columns of `chance` are.
     """
-    chance = chances(len(known), number, seed)
     return {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
 
 

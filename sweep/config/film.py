@@ -200,11 +200,7 @@ def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array
 
 def _why(missing: int, gaps: Mapping[int, str], whole: int, every: int) -> str:
     """Describe the rows of a film left out: those in `gaps`, and all but every `every`-th of the `whole` ones."""
-    example = next((text for text in gaps.values() if text.lower() not in GAPS), "")
-    words = (
-        [f"{counted(missing, 'row')} without a number" + (f" (one has '{brief(example, 40)}')" if example else "")]
-        if missing
-        else []
-    )
+    example = next((f" (one has '{brief(text, 40)}')" for text in gaps.values() if text.lower() not in GAPS), "")
+    words = [f"{counted(missing, 'row')} without a number{example}"] if missing else []
     words += [f"all but one in {every} of {whole} rows, as more would hardly add information"] if every > 1 else []
     return " and ".join(words)

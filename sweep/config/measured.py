@@ -137,10 +137,8 @@ def _body(formula: Callable[[solids.Numbers], solids.Numbers], given: Given) -> 
     # The angle, which is hard to measure, causes the uncertainty.
     unsure = "Ixy" if errors.get("angle") else ""
     entries = (_entry(name, value, spread[name], units[name], name == unsure) for name, value in found.items())
-    guesses = {"sigma": found["Izz"] / _LASTS, "n0": -_SPIN if found.get("Ixy", 0) > 0 else _SPIN}
-    return _BODY.format(
-        units=SI, entries="\n".join(entries), x0=found["a"] / 50, y0=found["b"] / 50, **guesses
-    )  # fmt: skip
+    start = {"n0": -_SPIN if found.get("Ixy", 0) > 0 else _SPIN, "x0": found["a"] / 50, "y0": found["b"] / 50}
+    return _BODY.format(units=SI, entries="\n".join(entries), sigma=found["Izz"] / _LASTS, **start)
 
 
 def _entry(name: str, value: float, error: float, unit: str, unsure: bool) -> str:

@@ -75,16 +75,12 @@ class Table:
         """
         cells = [row[column] for row in self.rows]
         if commas := [cell for cell in cells if _COMMA.fullmatch(cell)]:
-            if pointed := next(
-                (cell for cell in cells if "." in cell and number(cell.replace(",", "")) is not None), ""
-            ):
-                words = f"has {commas[0]!r} and {pointed!r}; use decimal points only, and no thousands separators"
+            if pointed := [cell for cell in cells if "." in cell and number(cell.replace(",", "")) is not None]:
+                words = f"has {commas[0]!r} and {pointed[0]!r}; use decimal points only, and no thousands separators"
                 raise ConfigError([self.fault(words, column)])
             if self.separator != ";" and all(map(_THOUSANDS.fullmatch, commas)):
-                plain = commas[0].replace(",", ".", 1), commas[0].replace(",", "")
-                words = (
-                    f"{commas[0]!r} may be {plain[0]} or {plain[1]}; write one of these, or semicolons between columns"
-                )
+                small, large = commas[0].replace(",", ".", 1), commas[0].replace(",", "")
+                words = f"{commas[0]!r} may be {small} or {large}; write one of these, or semicolons between columns"
                 raise ConfigError([self.fault(words, column, cells.index(commas[0]))])
             cells = [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in cells]
         return [cell if (value := number(cell)) is None else value for cell in cells]

@@ -1,15 +1,41 @@
-"""Defines cells with everything needed to run them: kernel, parameters, steps, and state rows of their trajectories."""
+"""Defines cells with everything needed to run them, and tracks those of a batch: one table of state rows per method.
+
+A cell has one state row that runs, or waits for a lane. In addition it may have the row of the run before, while a
+failure is being examined, and a row that is set aside while another one runs in its place.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.status import FAILURES
+from sweep.kernels.layout import Layout, Table
+from sweep.kernels.status import FAILURES, QUIET, RUNNING
 from sweep.models.model import Columns, Model
+
+RUN, APPROACH, COMPANION, DONE = range(4)
+"""Stages of a cell: it runs to its end; it runs to a few steps ahead of a failure, which is set aside; its companion
+runs, and the run is set aside; everything is known."""
+
+MET = ("met.kind", "met.time", "met.spin", "met.doubt")
+"""What the last run met (`sweep.engine.failures.Met`)."""
+
+ERRORS = (
+    "error.spin", "error.rattle", "error.least", "error.reversals", "error.apart", "error.overshoot",
+    "error.nearest_approach",
+)  # fmt: skip
+"""What the last companion showed (`sweep.engine.errors.Errors`)."""
+
+NOTES = Layout((
+    "stage", "leg", "wary", "most", "step", "step_rule", "halvings", "brief", "step_before", *MET,
+    "repeats", "most_error", *ERRORS,
+))  # fmt: skip
+"""The notes on each cell. `leg`, `wary` and `most` belong to `sweep.engine.ending`; `halvings`, `brief`, `step_before`
+and what was met belong to `sweep.engine.failures`; the others belong to `sweep.engine.errors`."""
 
 
 @dataclass(frozen=True)
@@ -94,3 +120,78 @@ class Cells:
         wanted, until = (self.step if step is None else step), (self.rules.t_end if t_end is None else t_end)
         with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method
             return self.kernel.images(self.columns, wanted, until, self.stable)
+
+
+class Lives:
+    """The cells of one method, and the progress of each.
+
+    Attributes
+    ----------
+    cells : with the state rows that run
+    notes : a `Table` with the layout `NOTES`
+    before : state rows of the previous runs, shape (cells, rows)
+    aside : state rows that are set aside, shape (cells, rows)
+    """
+
+    def __init__(self, cells: Cells) -> None:
+        self.notes = Table(np.zeros((len(cells.cells), len(NOTES.names))), NOTES)
+        self.notes["step"], self.notes["step_rule"], self.notes["most"] = cells.step, cells.step_rule, np.inf
+        self.notes["most_error"] = np.inf
+        self.notes.set_columns(ERRORS, np.nan)
+        self.cells = replace(cells, step=self.notes["step"], step_rule=self.notes["step_rule"])
+        # Pages that are never written take no memory.
+        self.before, self.aside = np.zeros_like(cells.images), np.zeros_like(cells.images)
+
+    @property
+    def stage(self) -> Array:
+        return self.notes["stage"]
+
+    @property
+    def running(self) -> Array:
+        """Return the indices of cells that wait for steps."""
+        return np.flatnonzero((self.stage != DONE) & (self.cells.status == RUNNING))
+
+    @property
+    def quiet(self) -> Array:
+        """Return the indices of cells that wait to continue without steps."""
+        return np.flatnonzero((self.stage != DONE) & (self.cells.status == QUIET))
+
+    @property
+    def ended(self) -> Array:
+        """Return the indices of cells whose stage has ended."""
+        return np.flatnonzero((self.stage != DONE) & ~np.isin(self.cells.status, (RUNNING, QUIET)))
+
+    def table(self, rows: Array) -> Table:
+        """Return a copy of some state rows, to be written back."""
+        return self.cells.kernel.table(self.cells.images[rows])
+
+    def take(self, rows: Array) -> Cells:
+        """Return some cells, with a copy of their state rows."""
+        return self.cells.take(rows)
+
+    def note(self, rows: Array, names: Sequence[str], values: Array | float) -> None:
+        """Note `values`, of shape (rows, names) or the same for all, for the cells `rows`."""
+        self.notes.images[rows[:, None], np.array([NOTES.index(name) for name in names])] = values
+
+    def enter(
+        self, rows: Array, stage: int, images: Array, *, settles: bool = False, goal: Array | float = np.inf
+    ) -> None:
+        """Set the state rows of the cells `rows` in a stage: they run to their ends, or for `goal` steps."""
+        table = self.cells.kernel.table(images)
+        table["settles"], table["goal"] = settles, np.minimum(table["steps"], goal)
+        self.cells.images[rows], self.notes["stage"][rows] = images, stage
+
+    def saved(self) -> dict[str, Array]:
+        """Return everything that an interrupted batch needs to resume, by name."""
+        tables = {"images": self.cells.images, "notes": self.notes.images}
+        tables |= {"before": self.before} if self.notes["halvings"].any() else {}
+        tables |= {"aside": self.aside} if np.isin(self.stage, (APPROACH, COMPANION)).any() else {}
+        return {f"{self.cells.method} {name}": table for name, table in tables.items()}
+
+    def resume(self, saved: dict[str, Array]) -> None:
+        """Resume from what `saved` returned, if it is of these cells."""
+        own = {"images": self.cells.images, "notes": self.notes.images, "before": self.before, "aside": self.aside}
+        found = {name: saved[key] for name in own if (key := f"{self.cells.method} {name}") in saved}
+        if all(name in found and found[name].shape == own[name].shape for name in ("images", "notes")):
+            for name, table in found.items():
+                own[name][:] = table

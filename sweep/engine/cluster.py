@@ -23,8 +23,7 @@ from sweep.grid import Tile
 from sweep.interrupt import point
 from sweep.kernels.build import APPROACH, build
 from sweep.kernels.layout import LANES
-from sweep.results.identity import Identity
-from sweep.results.provenance import identify, sources
+from sweep.results.provenance import Identity, identify, sources
 from sweep.results.store import StoreError
 
 if TYPE_CHECKING:

@@ -10,17 +10,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.engine.cells import Cells
-from sweep.engine.lives import RUN, Lives
-from sweep.engine.winding import watch, whole_blocks, winds_down
+from sweep.engine.cells import RUN, Cells, Lives
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.measures.decay import WOUND
+from sweep.kernels.layout import BLOCK
+from sweep.kernels.measures.decay import EVERY, LEFT, LOOKS, NEXT, WOUND
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
+from sweep.models.general import rigid_body, starts
 from sweep.models.model import ENDING, Model
 from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
+from sweep.models.theory.rocking import frequencies
 
 FIRST, LATER = range(2)
 """Legs of a run: to `patience`, and to `t_end`."""
@@ -35,6 +36,12 @@ _LEAST, _NEGLECTED = 0.02, 3.0
 
 # Above this relative error, the slow equations predict nothing.
 _LARGEST = 0.2
+
+# Length of a window in which a rattle that rolls round is watched, as a share of the patience.
+_WINDOW = 0.1
+
+# A rattle rolls round if the body turns by more than one radian while its two modes gain half a radian on each other.
+_ROLLS = 0.5
 
 
 def begin(lives: Lives, rows: Array, images: Array, most: Array | float = np.inf) -> None:
@@ -136,3 +143,27 @@ def _error(cells: Cells) -> tuple[Array, Array]:
     """Return the relative error of the slow equations, and the fastest spin that the energy allows, (cells,)."""
     fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / cells.inertia)
     return np.maximum(_NEGLECTED * bending(cells.model, cells.columns) * fastest**2, _LEAST), fastest
+
+
+def whole_blocks(steps: Array) -> Array:
+    """Return the steps, rounded up: adams continues only from the end of a block, where its history is complete."""
+    return np.asarray(BLOCK * np.ceil(steps / BLOCK))
+
+
+def watch(cells: Cells, images: Array) -> None:
+    """Have `images` of cells at t = 0 watched, in place: from the start if they roll round, or in the last window."""
+    table, patience = cells.kernel.table(images), cells.rules.patience
+    if NEXT not in table.layout or patience is None:
+        return
+    surface = cells.model.variant.surface
+    slower, faster = frequencies(rigid_body.rocking(cells.columns, surface))
+    rolls = faster - slower < _ROLLS * np.abs(starts.spin(cells.columns, surface))
+    table[EVERY] = every = whole_blocks(_WINDOW * patience / (LOOKS * table["step"]))
+    last = whole_blocks(patience / table["step"]) - LOOKS * every
+    table[NEXT] = np.where(rolls, 0.0, np.where(last < 0, np.inf, last))
+
+
+def winds_down(cells: Cells) -> Array:
+    """Return whose rattle will have wound down before `t_end`, so that the rest can be followed, (cells,)."""
+    patience, t_end, left = cells.rules.patience or 0.0, cells.rules.t_end, cells.recorded(LEFT)
+    return np.asarray((left > 0) & (left * _WINDOW * patience < t_end - patience))

@@ -24,9 +24,8 @@ from sweep.models.model import Model
 from sweep.parameters import Parameter, sections
 from sweep.results import dataset
 from sweep.results.dataset import ROWS
-from sweep.results.identity import Identity
 from sweep.results.netcdf import open_dataset
-from sweep.results.provenance import identify
+from sweep.results.provenance import Identity, identify
 from sweep.results.store import Store
 
 RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
@@ -84,14 +83,12 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
     changed |= {"film"} if config.film and there.attrs.get("film_sha256", "") not in ("", config.film.sha256) else set()
-    less = [each for each in old["measure"] if each not in new["measure"]] or (
-        new["integrator.t_end"] < old["integrator.t_end"] and not rerun
-    )
+    less = [each for each in old["measure"] if each not in new["measure"]]
     if rerun:
         changed = {key for key in changed if not key.startswith("integrator.")}
-    grown = _match(config.grid, _grid(there))
-    same_cells = len(grown) == there["status"].size
-    if changed or less or config.refine or (grown >= 0).sum() < there["status"].size or (rerun and not same_cells):
+    grown, size = _match(config.grid, _grid(there)), there["status"].size
+    smaller = len(grown) != size if rerun else new["integrator.t_end"] < old["integrator.t_end"]
+    if changed or less or smaller or config.refine or (grown >= 0).sum() < size:
         return found.difference(wanted) or edited
     return ""
 
@@ -105,9 +102,8 @@ def _is_edited(config: Config, there: xr.Dataset) -> bool:
     measured = {spec.partition("=")[0] for spec in str(there.attrs.get("measured", "")).split()}
     kinds = [MEASURES[each] for each in measured & MEASURES.keys()]
     needed = {"spin_final", "t_stop", "step", *(name for kind in kinds for name in kind.variables)}
-    if "measured" not in there.attrs or (
-        config.simulated and "inferred" not in there and not needed <= set(there.data_vars)
-    ):
+    lacking = config.simulated and "inferred" not in there and not needed <= set(there.data_vars)
+    if lacking or "measured" not in there.attrs:
         return True
     written = dataset.layout(grid, set(map(str, there.data_vars)))
     return any(

@@ -25,9 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.engine import ending
-from sweep.engine.cells import Cells
+from sweep.engine.cells import COMPANION, ERRORS, Cells, Lives
 from sweep.engine.failures import MOST_STEPS
-from sweep.engine.lives import COMPANION, ERRORS, Lives
 from sweep.engine.plan import TOLERANCE_TIME, Plan
 from sweep.grid import Array
 from sweep.kernels.measures.margin import EXTREMES

@@ -36,9 +36,8 @@ def estimate(config: Config) -> str:
     """Describe cells, steps, memory and time of a run, a line each."""
     grid = config.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True))
-    cells = f"cells:  {grid.size}{f' ({axes})' if axes else ''}" + (
-        ", not all of them simulated" if config.refine else ""
-    )
+    cells = f"cells:  {grid.size}{f' ({axes})' if axes else ''}"
+    cells += ", not all of them simulated" if config.refine else ""
     if not config.simulated:
         return cells
     sample = grid.sample(_SAMPLE)
@@ -54,13 +53,11 @@ def estimate(config: Config) -> str:
     memory, disk = min(grid.size, BATCH) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
     parts = f"{duration(compiling)} to compile, {duration(seconds)} to compute, {duration(_AROUND)} to start and draw"
     total_time = duration(compiling + seconds + _AROUND)
-    return "\n".join(
-        [
-            cells,
-            f"steps:  {total:.3g} if every cell runs to t_end, {total / grid.size:.3g} per cell",
-            f"memory: {memory:.3g} MiB for running trajectories; on disk as much again, and {disk:.3g} MiB of results",
-            f"time:   about {total_time}: {parts}; less if cells settle, more if some run again",
-        ]
+    return (
+        f"{cells}\n"
+        f"steps:  {total:.3g} if every cell runs to t_end, {total / grid.size:.3g} per cell\n"
+        f"memory: {memory:.3g} MiB for running trajectories; on disk as much again, and {disk:.3g} MiB of results\n"
+        f"time:   about {total_time}: {parts}; less if cells settle, more if some run again"
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sweep.engine.lives import DONE, Lives
+from sweep.engine.cells import DONE, Lives
 from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.jit import threads
@@ -73,11 +73,7 @@ def _advance(lives: Lives, rows: Array, blocks: int) -> int:
 
 
 def execute(
-    kernel: Kernel,
-    images: Array,
-    *,
-    after_chunk: Callable[[], None] = lambda: None,
-    chunk_blocks: int | None = None,
+    kernel: Kernel, images: Array, *, after_chunk: Callable[[], None] = lambda: None, chunk_blocks: int | None = None
 ) -> None:
     """Advance all unfinished `images`, in place, until every trajectory has ended.
 

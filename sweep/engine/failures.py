@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sweep.engine import ending
-from sweep.engine.cells import Cells
-from sweep.engine.lives import APPROACH, MET, Lives
+from sweep.engine.cells import APPROACH, MET, Cells, Lives
 from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.kernels.build import APPROACH as COMPILED

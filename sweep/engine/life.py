@@ -12,9 +12,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sweep.engine import ending, errors, failures
-from sweep.engine.cells import Cells
+from sweep.engine.cells import APPROACH, COMPANION, DONE, RUN, Cells, Lives
 from sweep.engine.executor import keep_busy
-from sweep.engine.lives import APPROACH, COMPANION, DONE, RUN, Lives
 from sweep.grid import Array
 from sweep.kernels.methods import METHODS
 

@@ -39,14 +39,14 @@ class Reporter:
 
 
 class Count:
-    """Adds up finished tiles and the finished cells of running tiles for a reporter."""
+    """Adds up finished tiles and the finished cells of running tiles for a reporter, or the time that is covered."""
 
-    def __init__(self, reporter: Reporter) -> None:
-        self.reporter, self.began = reporter, time.perf_counter()
-        self.cells = self.before = self.done = self.failed = 0
-        self._farthest = 0.0
+    def __init__(self, reporter: Reporter, unit: str = "cells") -> None:
+        self.reporter, self.unit, self.began = reporter, unit, time.perf_counter()
+        self.cells = self.before = self.done = self._farthest = 0.0
+        self.failed = 0
 
-    def expect(self, cells: int, todo: int) -> None:
+    def expect(self, cells: float, todo: float) -> None:
         """Begin with `todo` cells to do out of `cells`; the others not counted so far come from an earlier run."""
         there = cells - todo - self.done
         self.cells, self.before, self.done = cells, self.before + there, self.done + there
@@ -64,4 +64,4 @@ class Count:
 
     def _report(self, done: float, failed: int) -> None:
         seconds = time.perf_counter() - self.began
-        self.reporter.chunk(Progress(self.cells, done, failed, self.before, seconds))
+        self.reporter.chunk(Progress(self.cells, done, failed, self.before, seconds, self.unit))

@@ -30,9 +30,8 @@ from sweep.plots import quantities
 from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
-from sweep.results.identity import Identity, not_resumed
 from sweep.results.netcdf import open_dataset
-from sweep.results.provenance import identify
+from sweep.results.provenance import Identity, identify, not_resumed
 from sweep.results.store import Running, Store, StoreError
 
 if TYPE_CHECKING:
@@ -153,7 +152,7 @@ def carry_out(result: Whole, store: Store, reporter: Reporter, client: Client | 
 
 
 def _kept(result: Whole, store: Store, running: Running | None) -> str:
-    """Return the state rows that an earlier run left, and report how far it got."""
+    """Say how far an earlier run got."""
     grid = result.simulated().grid
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
     started = sum(len(table) for name, table in running.tables.items() if name.endswith("images")) if running else 0

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.config import Config
-from sweep.faults import ConfigError, fault_of
+from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.figure import constants_in_lines, zero_line
@@ -91,8 +91,7 @@ def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
 def require_attitude(config: Config) -> None:
     """Raise a `ConfigError` if the bodies of a simulated model have no attitude that could be shown."""
     if config.simulated and not config.equations.path:
-        words = f"the bodies of {config.model} have no attitude; animate slip or noslip"
-        raise ConfigError([config.fault(("model",), words)])
+        raise config.error(("model",), f"the bodies of {config.model} have no attitude; animate slip or noslip")
 
 
 def check(path: Path) -> None:

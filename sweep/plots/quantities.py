@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.kernels.measures import MEASURES
 from sweep.plots import labels, regimes
@@ -102,7 +102,7 @@ def check_pictures(config: Config) -> None:
         if name not in known:
             words = refusal(name, f"a variable, such as {either(sorted(DERIVED))}", known)
         if words:
-            raise ConfigError([config.fault(("picture", i), words)])
+            raise config.error(("picture", i), words)
 
 
 def subject(dataset: xr.Dataset) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from sweep.grid import Array
-from sweep.results.identity import Identity, require_same
+from sweep.results.provenance import Identity, require_same
 from sweep.results.store import Running, Store, StoreError
 from sweep.results.writing import replacing
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.grid import CASE, SAMPLE, Array, Grid
 from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
@@ -63,11 +63,12 @@ def _flag(long_name: str, meanings: Mapping[int, str], description: str = "", **
 def _critical(name: str, side: str, source: str, by: str) -> Variable:
     where = "Positive spin above" if side == "plus" else "Negative spin below"
     event = "a tiny rattle grows" if name == "n_c1" else "the spin reverses"
-    symbol = f"{name}{'⁺' if side == 'plus' else '⁻'}"
-    return Variable("float64", SPIN, f"{symbol}, {source}", f"{where} which {event}, by {by}.", per_body=True)
+    title = f"{name}{SIDES[side]}, {source}"
+    return Variable("float64", SPIN, title, f"{where} which {event}, by {by}.", per_body=True)
 
 
-_SIDES = ("plus", "minus")
+SIDES = {"plus": "⁺", "minus": "⁻"}
+"""The signs of a critical spin, as names of variables have them, and as figures print them."""
 
 VARIABLES: dict[str, Variable] = {
     **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
@@ -76,29 +77,21 @@ VARIABLES: dict[str, Variable] = {
                       "How reversals and status were found."),
     "spin_final": Variable("float64", SPIN, "final spin n", "Spin at t_stop.", of_sound_runs=True),
     "spin_error": Variable("float64", SPIN, "estimated error of the final spin", of_sound_runs=True),
-    "sensitive": _flag(
-        "is the count sensitive?", {0: "firm", 1: "sensitive"},
-        "Whether different steps give a different number of reversals.", of_sound_runs=True,
-    ),
-    "decided": _flag(
-        "is the count certain?", {0: "open", 1: "decided"},
-        "Whether the number of reversals is final, with margins larger than ten times their errors.",
-        of_sound_runs=True,
-    ),
+    "sensitive": _flag("is the count sensitive?", {0: "firm", 1: "sensitive"},
+                       "Whether different steps give a different number of reversals.", of_sound_runs=True),
+    "decided": _flag("is the count certain?", {0: "open", 1: "decided"},
+                     "Whether the number of reversals is final, with margins larger than ten times their errors.",
+                     of_sound_runs=True),
     "t_stop": Variable("float64", TIME, "time of the end", "Time at which the simulation ended."),
     "method": _flag("integration method", {each.code: name for name, each in METHODS.items()}),
     "step": Variable("float64", TIME, "integration step"),
     "step_rule": _flag("what set the integration step", STEP_RULES),
     "reversals_predicted": Variable("int16", NUMBER, "spin reversals, predicted (Takano 2011)",
                                     "Spin reversals predicted by Takano (2011), cases (I) and (II)."),
-    "t_first_reversal_predicted": Variable(
-        "float64", TIME, "first reversal, predicted (Garcia–Hubbard)",
-        "Time of the first spin reversal predicted by Garcia and Hubbard (1988).",
-    ),
-    "reversal_time_reason": _flag(
-        "is the first reversal predicted?", reversal_time.REASONS,
-        "Whether the first reversal is predicted, and if not, why.",
-    ),
+    "t_first_reversal_predicted": Variable("float64", TIME, "first reversal, predicted (Garcia–Hubbard)",
+                                           "Time of the first spin reversal predicted by Garcia and Hubbard (1988)."),
+    "reversal_time_reason": _flag("is the first reversal predicted?", reversal_time.REASONS,
+                                  "Whether the first reversal is predicted, and if not, why."),
     **{
         f"{name}_{side}{suffix}": _critical(name, side, source, by)
         for name, suffix, source, by in (
@@ -109,16 +102,14 @@ VARIABLES: dict[str, Variable] = {
             ("n_c2", "_simulated_inner", "simulation, inner", "simulation: the end of the bracket nearer zero"),
             ("n_c2", "_simulated_outer", "simulation, outer", "simulation: the far end of the bracket"),
         )
-        for side in _SIDES
+        for side in SIDES
     },
     "form_factor": Variable("float64", NUMBER, "form factor L(f)", "Form factor L(f) of Takano (2011).", per_body=True),
     **{
-        f"{name}_{side}_reason": _flag(
-            f"{name}{'⁺' if side == 'plus' else '⁻'}: outcome", REASONS,
-            f"Whether {source} give {name}_{side}, and if not, why.", per_body=True,
-        )
+        f"{name}_{side}_reason": _flag(f"{name}{SIDES[side]}: outcome", REASONS,
+                                       f"Whether {source} give {name}_{side}, and if not, why.", per_body=True)
         for name, source in (("n_c1", "eigenvalues"), ("n_c2", "simulations"))
-        for side in _SIDES
+        for side in SIDES
     },
     "critical_reason": _flag("why a critical spin is missing", REASONS,
                              "First of the four reasons other than `exists`.", per_body=True),
@@ -174,9 +165,8 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
     found = probabilities(dataset)
     counts = np.arange(1, found["probability"].shape[-1] + 1)
     coordinate = xr.Variable(("count",), counts, {"long_name": "spin reversals, at least"})
-    return dataset.assign_coords(count=coordinate).assign(
-        variables(PROBABILITIES, (*axes, "count"), found, config.units)
-    )
+    added = variables(PROBABILITIES, (*axes, "count"), found, config.units)
+    return dataset.assign_coords(count=coordinate).assign(added)
 
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
@@ -185,7 +175,7 @@ def check_names(config: Config, series: Iterable[str] = ()) -> None:
     names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
-        raise ConfigError([config.fault(("model",), words)])
+        raise config.error(("model",), words)
 
 
 def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]:
@@ -223,7 +213,7 @@ def variables(
 ) -> dict[str, xr.Variable]:
     """Return the variables of `specs` that `found` contains, along common dimensions."""
     return {
-        name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype), described(spec, system))
+        name: xr.Variable(dims, np.asarray(found[name]).astype(spec.dtype, copy=False), described(spec, system))
         for name, spec in specs.items()
         if name in found
     }

@@ -12,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from sweep.results import netcdf
-from sweep.results.identity import Identity
+from sweep.results.provenance import Identity
 from sweep.results.store import StoreError
 from sweep.results.writing import remove_unfinished, replacing, require_writable
 
@@ -62,9 +62,8 @@ class RunFiles:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 os.close(handle)
-                raise StoreError(
-                    f"{self.folder / self.name}: in use by another run; wait for it, or choose another --output"
-                ) from None
+                words = "in use by another run; wait for it, or choose another --output"
+                raise StoreError(f"{self.folder / self.name}: {words}") from None
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), path.stat()):
                     break

@@ -11,7 +11,7 @@ import xarray as xr
 
 from sweep.faults import counted
 from sweep.parameters import PARAMETERS
-from sweep.results.dataset import VARIABLES
+from sweep.results.dataset import SIDES, VARIABLES
 from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
 from sweep.results.probabilities import PROBABILITIES
@@ -46,7 +46,9 @@ def _over(dims: tuple[str, ...], *names: str) -> dict[str, tuple[str, ...]]:
     return dict.fromkeys(names, dims)
 
 
-_SPINS = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
+SPINS = {f"{n}_{side}": f"{n}_{side}_{by}" for n, by in (("n_c1", "linear"), ("n_c2", "simulated")) for side in SIDES}
+"""The critical spins, each with the variable that holds the model's own value."""
+
 _ENDS = [f"{order}{end}" for order in ("first_order", "total_order") for end in ("", "_low", "_high")]
 _FITTED = ("value", *(f"{end}_{share}" for share in (68, 95) for end in ("lower", "upper")))
 
@@ -56,8 +58,7 @@ TRAJECTORY = Kind(
 )  # fmt: skip
 CRITICAL = Kind(
     "critical", "critical spins", frozenset({"critical_reason"}), explored=True,
-    needs=_over((), "critical_reason", *(f"{name}_reason" for name in _SPINS),
-                *(f"{name}_{'linear' if name.startswith('n_c1') else 'simulated'}" for name in _SPINS)),
+    needs=_over((), "critical_reason", *(f"{name}_reason" for name in SPINS), *SPINS.values()),
 )  # fmt: skip
 BOUNDARIES = Kind(
     "boundaries", "boundaries", frozenset({"level", "curve", "end_more"}),

@@ -147,9 +147,8 @@ def smoothed(x: Array, y: Array, *, closed: bool, parts: int = 8) -> tuple[Array
         points = np.concatenate([points[-2:], points, points[:3]])
     steps = np.hypot(*np.diff(points, axis=0).T)
     along = np.append(0.0, np.cumsum(steps))
-    spline = CubicHermiteSpline(
-        along, points, np.gradient(points, along, axis=0, edge_order=2 if len(points) > 2 else 1)
-    )
+    slopes = np.gradient(points, along, axis=0, edge_order=2 if len(points) > 2 else 1)
+    spline = CubicHermiteSpline(along, points, slopes)
     places = np.interp(np.arange(parts * len(steps) + 1) / parts, np.arange(len(along)), along)
     curve = spline(places[2 * parts : -2 * parts] if closed else places)
     return curve[:, 0], curve[:, 1]

@@ -12,7 +12,7 @@ from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import REASONS, STATUSES, Reason
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, TRAJECTORY, Kind, kind, parameters
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
 
@@ -147,9 +147,8 @@ def _critical(dataset: xr.Dataset) -> Iterator[str]:
     yield f"critical spins of {_count(dataset['critical_reason'], 'body', 'bodies')}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
-    for name in ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus"):
-        source = "linear" if name.startswith("n_c1") else "simulated"
-        codes, spins = dataset[f"{name}_reason"].values, dataset[f"{name}_{source}"].values
+    for name, source in SPINS.items():
+        codes, spins = dataset[f"{name}_reason"].values, dataset[source].values
         counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
         counts["found"] = counts.pop(REASONS[Reason.EXISTS])
         ends = ", ".join(f"{count} {words.replace('_', ' ')}" for words, count in counts.items() if count)

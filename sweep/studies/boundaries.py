@@ -17,7 +17,8 @@ import numpy as np
 import xarray as xr
 
 from sweep.axis import Axis, contours
-from sweep.config import Config, ConfigError
+from sweep.config import Config
+from sweep.engine.estimate import estimate
 from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.kernels.status import TIME_LIMIT
@@ -27,11 +28,13 @@ from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies import DEVIATIONS, WIDTHS
 from sweep.studies.curve import Cell, Curve, Middle, Point
-from sweep.studies.search import Search, measuring, require_between, require_certain
-from sweep.studies.study import Task
+from sweep.studies.study import Search, Task, measuring, require_between, require_certain
 
 # Largest rounding error of a whole index along an edge of the grid. `_levelled` keeps points on diagonals farther away.
 _ON = 1e-9
+
+_A_POINT = 8
+"""Typical number of simulations that narrow a bracket to the usual width."""
 
 Asked = tuple[Curve, Point | Middle, float]
 """A requested cell: the part and curve that it belongs to, and its place along the line."""
@@ -51,7 +54,7 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     """Return the axes over which boundaries are curves: the named ones, or else the first two."""
     require_certain(config)
     if COUNT not in config.equations.offers:
-        raise ConfigError([config.fault(("model",), "does not count reversals, so it has no boundaries")])
+        raise config.error(("model",), "does not count reversals, so it has no boundaries")
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in long:
@@ -61,7 +64,7 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
     up = y or next(rest, None)
     right = x or next(rest, None)
     if up is None or right is None or up == right:
-        raise ConfigError([config.fault((), "boundaries need two axes; give two parameters more than one value")])
+        raise config.error((), "boundaries need two axes; give two parameters more than one value")
     return right, up
 
 
@@ -78,6 +81,11 @@ class Boundaries(Search):
         self._asked: list[Asked] = []
         """The cells requested last."""
         self._asking = self._search()
+
+    def estimate(self) -> str:
+        words = f"then:   about {_A_POINT} simulations for each point where a curve crosses a line of the grid, "
+        words += f"over {self.across[0]} and {self.across[1]}, and 2 or more between two points"
+        return f"{estimate(self.config)}\n{words}"
 
     def ask(self) -> Mapping[str, Array]:
         if not self.rounds:
@@ -127,11 +135,8 @@ class Boundaries(Search):
         """Return the dataset of the points, with the cost of the search."""
         columns = self._columns()
         head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.attributes()
-        middles = [middle for curve in self.curves for middle in curve.middles.values()]
-        head |= {
-            "deviation": self.deviation,
-            "middles_off": sum(not middle.confirmed for middle in middles),
-        } | self._grid
+        off = sum(not middle.confirmed for curve in self.curves for middle in curve.middles.values())
+        head |= {"deviation": self.deviation, "middles_off": off, **self._grid}
         title = f"{self.config.name}: boundaries ({self.config.model} model)"
         own = variables(POINTS, ["point"], columns)
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})

@@ -12,14 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import run
 from sweep.faults import fault_of
 from sweep.grid import Array
+from sweep.models.general import starts
+from sweep.models.general.surfaces import SURFACES
 from sweep.models.model import ENDING
 from sweep.prediction import foreseen
-from sweep.studies.search import measuring, require_certain
+from sweep.studies.study import measuring, require_certain
 
 # Each parameter is scanned from half of its value to twice as much, in steps of 0.7 %.
 _FACTOR, _PLACES = 2.0, 201
@@ -61,7 +63,7 @@ def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
     cell = _cell(config)
     now = int(_counts(config, {name: np.array([value]) for name, value in cell.items()}, reporter)[0])
     if now < 0:
-        raise ConfigError([config.fault((), "the count of this body is not decided; see `decided` of a run")])
+        raise config.error((), "the count of this body is not decided; see `decided` of a run")
     brackets = _foreseen(config, cell, reversals)
     while wide := {name: each.places() for name, each in brackets.items() if each.wide}:
         columns = {name: np.tile(value, (len(wide), _TOGETHER)) for name, value in cell.items()}
@@ -79,10 +81,9 @@ def _cell(config: Config) -> dict[str, float]:
     require_certain(config)
     if config.grid.size > 1:
         name = next(name for name, values in {**config.axes, **config.cases}.items() if len(values) > 1)
-        raise ConfigError([config.fault(config.table[name].place, "has several values; give a single one")])
+        raise config.error(name, "has several values; give a single one")
     if ENDING not in config.equations.offers:
-        message = "has no foreseen counts; choose viscous friction"
-        raise ConfigError([config.fault(("model",), message)])
+        raise config.error(("model",), "has no foreseen counts; choose viscous friction")
     return {name: float(column[0]) for name, column in config.grid.columns().items()}
 
 
@@ -94,17 +95,26 @@ def _foreseen(config: Config, cell: Mapping[str, float], reversals: int) -> dict
     for i, name in enumerate(names):
         columns[name][i] *= factors
     flat = {name: values.ravel() for name, values in columns.items()}
-    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"]
-    counts = np.where(config.equations.impossible(flat), -1, counts).reshape(columns[names[0]].shape)
+    # What cannot be run has the present count, as if it were the body itself.
+    possible = _possible(config, flat)
+    flat = {name: np.where(possible, values, cell[name]) for name, values in flat.items()}
+    counts = foreseen(config.equations, flat, check=False)["reversals_foreseen"].reshape(len(names), _PLACES)
     middle, brackets = _PLACES // 2, dict[str, _Bracket]()
     for i, name in enumerate(names):
-        allowed = np.array([config.table[name].allows(value) for value in columns[name][i]])
-        reached = np.flatnonzero(allowed & _reach(counts[i], counts[i, middle], reversals))
+        reached = np.flatnonzero(_reach(counts[i], counts[i, middle], reversals))
         if reached.size:
             nearest = reached[np.abs(reached - middle).argmin()]
-            far = cell[name] * factors[nearest] ** _FARTHER
-            brackets[name] = _Bracket(cell[name], far, int(counts[i, nearest]))
+            ends = cell[name] * factors[nearest] ** np.array([_FARTHER, 1.0])
+            there = _possible(config, {n: ends if n == name else np.full(2, value) for n, value in cell.items()})
+            brackets[name] = _Bracket(cell[name], float(ends[np.argmax(there)]), int(counts[i, nearest]))
     return brackets
+
+
+def _possible(config: Config, columns: Mapping[str, Array]) -> Array:
+    """Return which cells can be run: values within their bounds, a body that stands, and a start point on it."""
+    bounded = [np.vectorize(config.table[name].allows)(values) for name, values in columns.items()]
+    off = SURFACES[config.surface].off(columns, *starts.point(columns)) if "x0" in columns else False
+    return np.asarray(np.all(bounded, axis=0) & ~config.equations.impossible(columns) & np.logical_not(off))
 
 
 def _reach(counts: Array, now: int, reversals: int) -> Array:

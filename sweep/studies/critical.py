@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, ConfigError, Values
+from sweep.config import Config, Values
+from sweep.engine.estimate import estimate
 from sweep.grid import Array
 from sweep.models.model import Columns
 from sweep.models.theory.stability import SPIN_LIMIT
@@ -22,14 +23,16 @@ from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies import WIDTHS
 from sweep.studies.roots import Root
-from sweep.studies.search import Search, measuring, require_between, require_certain
-from sweep.studies.study import Task
+from sweep.studies.study import Search, Task, measuring, require_between, require_certain
 
 RATIO = 1.25
 """Ratio of successive spins in the outward search."""
 
 # Number of spins simulated at once in the outward search.
 _OUTWARDS = 5
+
+_A_SPIN = 4
+"""Typical number of simulations that narrow a bracket to the usual width."""
 
 # The search ends at this multiple of n_c1. The paper's n_c2 is 2 n_c1; over 200 bodies (a = 1.5 … 50, |δ| <= 0.5, μ =
 # 0.1 … 5000) it was found at up to 7.7 n_c1, with a median of 2.01. Beyond that, fast spins take long to simulate, and
@@ -48,13 +51,11 @@ def searchable(config: Config) -> Config:
     """Return `config` with a single start spin, which has no influence; raise a `ConfigError` if it is unsuitable."""
     require_certain(config)
     if not config.of_rattlebacks:
-        raise ConfigError([config.fault(("model",), "not a rattleback; choose the model slip or noslip")])
+        raise config.error(("model",), "not a rattleback; choose the model slip or noslip")
     if beyond := sorted((START - {"n0"}) & set(config.axes)):
-        raise ConfigError([config.fault(("start", beyond[0]), "cannot be an axis of critical spins; give one number")])
+        raise config.error(beyond[0], "cannot be an axis of critical spins; give one number")
     if "n0" not in config.tier.parameters:
-        raise ConfigError(
-            [config.fault(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")]
-        )
+        raise config.error(("start",), "cannot be given by angles and angular velocities here; give x0 and y0")
     parameters = config.parameters | {"n0": Values.one(0.0)}
     cases = {name: v for name, v in config.cases.items() if name != "n0"}
     found = replace(measuring(config), parameters=parameters, cases=cases)
@@ -149,6 +150,16 @@ class CriticalSpins(Search):
             for body in np.flatnonzero(self.first[side] == Reason.EXISTS).tolist()
         ]
         self._asked: list[tuple[Spin, list[float]]] = []
+
+    def estimate(self) -> str:
+        axes = " × ".join(f"{d} {n}" for d, n in zip(self.grid.dims, self.grid.shape, strict=True)) or "one body"
+        bodies = f"bodies: {self.grid.size} ({axes}), each with spins of both signs"
+        if not self.spins:
+            return f"{bodies}; none has an n_c1 from which to search"
+        self.rounds.append(self.ask())
+        then = "then:   more spins farther out where none of these reverses, and about "
+        then += f"{_A_SPIN} simulations for each n_c2"
+        return "\n".join([bodies, estimate(self.simulated()), then])
 
     def ask(self) -> Mapping[str, Array]:
         spins = [spin for spin in self.spins if spin.reason is None]

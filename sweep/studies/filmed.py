@@ -38,13 +38,12 @@ def _beside(found: xr.Dataset, reporter: Reporter | None) -> xr.Dataset:
     Outliers are not shown.
     """
     config, time = configuration(found), found["time"].values
-    parameters = found["parameter"].values.tolist() if "law" not in found.dims else []
-    delay = found["value"].sel(parameter="film_delay").item() if "film_delay" in parameters else 0.0
+    best = found.isel(law=int(np.argmax(found["weight"].values))) if "law" in found.dims else found
+    delay = best["value"].sel(parameter="film_delay").item() if "film_delay" in best["parameter"] else 0.0
     integrator = config.integrator.model_copy(update={"t_end": float(time[-1]) + delay})
     fit = trajectory(replace(config, integrator=integrator), reporter=reporter)
     if "heading" not in fit:
         return fit
-    best = found.isel(law=int(np.argmax(found["weight"].values))) if "law" in found.dims else found
     kept = ~best["outlier"].values if "outlier" in best else np.ones(len(time), bool)
     off, late = (best["seen"] - best["fitted"]).values[kept], time[kept] + delay
     of_angles = found["seen"].attrs.get("units") == "radian"

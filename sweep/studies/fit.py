@@ -8,7 +8,7 @@ curve that it finds does not fit, the search is repeated from more points.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import ceil
@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from scipy.stats import qmc
 
-from sweep.config import Config, ConfigError, Values
+from sweep.config import Config, Values
 from sweep.config.cross_checks import misplaced, unlike
 from sweep.config.film import Film
 from sweep.ended import ended
@@ -32,8 +32,8 @@ from sweep.results.provenance import provenance
 from sweep.studies import ranges, verdict
 from sweep.studies.concurrent import run_concurrently
 from sweep.studies.intervals import LEVELS, blind, covariance, intervals, variance
-from sweep.studies.misfit import ENOUGH, UNKNOWNS, Minimum, Problem, minimise
-from sweep.studies.search import require_simulated
+from sweep.studies.misfit import ENOUGH, UNKNOWNS, Minimum, Note, Problem, minimise
+from sweep.studies.study import require_simulated
 from sweep.units import ANGLE, SPIN, TIME
 from sweep.variables import Variable
 
@@ -73,9 +73,7 @@ _RUGGED = "the misfit is rugged: minima lie close together, and the intervals be
 
 
 @deferred()
-def fit(
-    config: Config, film: Film, free: Sequence[str], note: Callable[[str], None], *, compared: bool = False
-) -> xr.Dataset:
+def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared: bool = False) -> xr.Dataset:
     """Fit the law of friction that `config` names, which may be one of several that are `compared`."""
     if not np.isfinite([film.time, film.value, film.errors]).all():
         raise fault_of("the film holds a value that is not a number; leave out that instant")
@@ -97,7 +95,7 @@ def fit(
         raise fault_of(f"{len(sought)} parameters are free, and the film has {len(film.time)} rows; free fewer")
     ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
-        raise ConfigError([config.fault(("start", "x0"), f"the range of a free parameter is too wide: {off}")])
+        raise config.error("x0", f"the range of a free parameter is too wide: {off}")
     with blamed(config.origin):
         problem = Problem(config, film, sought, _countable(film))
         _check_length(problem)
@@ -152,14 +150,13 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
             message = f"{brief(name)} is not a parameter of the {config.tier.name} model{suggestion(name, known)}"
             raise fault_of(f"{message}; these can be free: {', '.join(known)}")
     if config.cases:
-        raise ConfigError([config.fault(("cases",), "cannot be fitted; a fit takes a single body")])
+        raise config.error(("cases",), "cannot be fitted; a fit takes a single body")
     if more := [name for name in config.axes if name not in free]:
-        place = config.table[more[0]].place
-        raise ConfigError([config.fault(place, "has several values; make it free, or give one value")])
+        raise config.error(more[0], "has several values; make it free, or give one value")
     return config
 
 
-def _found(problem: Problem, note: Callable[[str], None]) -> tuple[Problem, list[Minimum]]:
+def _found(problem: Problem, note: Note) -> tuple[Problem, list[Minimum]]:
     """Return the minima over the whole film, lowest first, and the problem with the final ranges and outliers."""
     found: list[tuple[Problem, list[Minimum]]] = []
     for seed, (points, kept) in enumerate(SEARCHES):
@@ -189,7 +186,7 @@ def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
     return turned
 
 
-def _search(problem: Problem, points: int, kept: int, seed: int, note: Callable[[str], None]) -> list[Minimum]:
+def _search(problem: Problem, points: int, kept: int, seed: int, note: Note) -> list[Minimum]:
     """Return minima over the whole film, lowest first."""
     sobol = qmc.Sobol(len(problem.free), rng=seed).random(points)
     rows = len(problem.film.time)
@@ -211,9 +208,7 @@ def _minimised(
     return _different(run_concurrently([partial(minimise, place=place, enough=enough) for place in places], answers))
 
 
-def _settled(
-    problem: Problem, minima: list[Minimum], note: Callable[[str], None]
-) -> tuple[Problem, list[Minimum]]:  # fmt: skip
+def _settled(problem: Problem, minima: list[Minimum], note: Note) -> tuple[Problem, list[Minimum]]:
     """Return the minima after leaving out outliers and widening ranges at whose ends the best minimum lies."""
     for _ in range(_ROUNDS):
         best = minima[0]
@@ -253,13 +248,9 @@ def _labelled(
     judged, edge = verdict.judged(problem, best), _ends(problem, limits)
     shown, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
-        f"{side}_{level}": (
-            "parameter",
-            problem.values(limits[k, end]),
-            {"long_name": f"{side} end, {level} % confidence"},
-        )
-        for k, level in enumerate(LEVELS)
-        for end, side in enumerate(("lower", "upper"))
+        f"{side}_{level}": ("parameter", problem.values(place), {"long_name": f"{side} end, {level} % confidence"})
+        for level, places in zip(LEVELS, limits, strict=True)
+        for side, place in zip(("lower", "upper"), places, strict=True)
     }
     found = xr.Dataset(
         {

@@ -11,15 +11,14 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from sweep.config import Config, ConfigError
-from sweep.config.distributions import chances
+from sweep.config import Config
+from sweep.config.distributions import chances, drawn
 from sweep.engine.whole import Whole
 from sweep.grid import Array
 from sweep.kernels.measures import chosen
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.results.dataset import variables
-from sweep.studies.search import require_simulated
-from sweep.studies.study import Task
+from sweep.studies.study import Task, require_simulated
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
@@ -55,19 +54,16 @@ def designed(config: Config) -> Config:
     """
     require_simulated(config)
     if not config.samples:
-        message = "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}"
-        raise ConfigError([config.fault((), message)])
-    if config.axes:
-        name = next(iter(config.axes))
-        raise ConfigError([config.fault(config.table[name].place, "cannot be an axis of indices; give one number")])
+        raise config.error((), "no parameter is a distribution; give one, such as n0: {normal: [0.05, 0.002]}")
+    for name in config.axes:
+        raise config.error(name, "cannot be an axis of indices; give one number")
     if not any(name in each.variables for each in chosen(config.measure) for name in QUANTITIES):
-        raise ConfigError([config.fault(("measure",), "has no quantity that indices are computed of; add reversals")])
+        raise config.error(("measure",), "has no quantity that indices are computed of; add reversals")
     known = config.distributions
     first, second = np.split(chances(2 * len(known), 1 << (config.samples - 1).bit_length(), config.seed), 2, axis=1)
     mixed = [np.where(np.arange(len(known)) == i, second, first) for i in range(len(known))]
     chance = np.concatenate([first, second, *mixed])
-    cases = {name: tuple(each.at(chance[:, i]).tolist()) for i, (name, each) in enumerate(known.items())}
-    return replace(config, cases=cases, samples=len(chance))
+    return replace(config, cases=drawn(known, chance), samples=len(chance))
 
 
 class Indices(Whole):
@@ -81,12 +77,10 @@ class Indices(Whole):
         values = np.stack([np.where(failed, np.nan, arrays[name]) for name in names])
         parameters = list(self.config.cases)
         found = estimated(values.reshape(len(names), len(parameters) + 2, -1), self.config.seed)
-        attributes = {"title": f"{self.config.name}: Sobol indices", **self._attributes(self.grid.size)}
-        return xr.Dataset(
-            variables(VARIABLES, ("quantity", "parameter"), found),
-            {"quantity": names, "parameter": parameters},
-            attributes | {"trajectories": self.grid.size},
-        )
+        title, size = f"{self.config.name}: Sobol indices", self.grid.size
+        attributes = {"title": title, **self._attributes(size), "trajectories": size}
+        labelled = variables(VARIABLES, ("quantity", "parameter"), found)
+        return xr.Dataset(labelled, {"quantity": names, "parameter": parameters}, attributes)
 
 
 def estimated(values: Array, seed: int) -> dict[str, Array]:

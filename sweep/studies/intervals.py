@@ -17,7 +17,7 @@ import numpy as np
 
 from sweep.grid import Array
 from sweep.studies.concurrent import run_concurrently
-from sweep.studies.misfit import Ask, Minimum, Problem, minimise
+from sweep.studies.misfit import Ask, Minimum, Note, Problem, minimise
 
 LEVELS = {68: 1.0, 95: 3.84}
 """Percentages of the intervals, and rise of the misfit at their ends: quantiles of chi square for one parameter."""
@@ -62,9 +62,7 @@ class _Side(NamedTuple):
     """A minimum that is lower than the best, if one is met."""
 
 
-def intervals(
-    problem: Problem, minima: Sequence[Minimum], note: Callable[[str], None]
-) -> tuple[Minimum, Array, bool]:  # fmt: skip
+def intervals(problem: Problem, minima: Sequence[Minimum], note: Note) -> tuple[Minimum, Array, bool]:
     """Return the best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
 
     `minima` are those of the search, the lowest first.  An end at 0 or 1 is an end of the range.  If a profile meets a
@@ -82,7 +80,7 @@ def intervals(
 
 
 def _profiles(
-    problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Callable[[str], None], *, stops: bool
+    problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Note, *, stops: bool
 ) -> tuple[Array, Minimum | None]:
     """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
     unit, parameters = variance(problem, best), range(len(problem.free))
@@ -203,15 +201,12 @@ def blind(problem: Problem, best: Minimum) -> list[str]:
         if 4 * np.sqrt(size) > _BLIND:
             some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
             parameters = " and ".join(some) + (" together" if len(some) > 1 else "")
-            sentences.append(
-                f"the film hardly determines {parameters}: the 95 % interval covers half of the range or more"
-            )
+            words = "the 95 % interval covers half of the range or more"
+            sentences.append(f"the film hardly determines {parameters}: {words}")
     deviation = np.sqrt(np.diag(spread))
     tied = spread / np.outer(deviation, deviation)
     sentences += [
         f"{names[i]} and {names[j]} are known only in combination: their correlation is {tied[i, j]:.3f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(tied[i, j]) > _TIED
+        for i, j in np.argwhere(np.tril(np.abs(tied), -1) > _TIED)
     ]
     return sentences

@@ -106,19 +106,17 @@ def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:
         akaike=("law", akaike, {"long_name": "Akaike's criterion"}),
         weight=("law", share / share.sum(), {"long_name": "Akaike's weight"}),
     )
-    sentences = apart_words = _told_apart(names, akaike - akaike.min())
-    excess = chi[best] / (rows - number[best])
+    compared = _told_apart(names, akaike - akaike.min())
+    sentences, excess = [*compared], chi[best] / (rows - number[best])
     if film.error is not None and excess > 1 + _MISSED * sqrt(2 / (rows - number[best])):
-        sentences = [
-            *sentences,
-            f"even {names[best]} misses the film by more than its errors: {excess:.3g} chi square an instant",
-        ]
+        words = f"even {names[best]} misses the film by more than its errors"
+        sentences.append(f"{words}: {excess:.3g} chi square an instant")
     blind = ((name, each) for name, one in found.items() for each in one.attrs["undetermined"].split("; ") if each)
-    sentences = [*sentences, *(f"{name}: {each}" for name, each in blind)]
+    sentences += [f"{name}: {each}" for name, each in blind]
     attributes: dict[str, Any] = dict(fits[best].attrs)
     attributes["title"] = attributes["title"].replace(": fitted", ": laws of friction fitted")
     attributes |= {"undetermined": "; ".join(sentences), "trajectories": sum(one.attrs["trajectories"] for one in fits)}
-    attributes["verdict"] = f"{names[best]}: {attributes['verdict']}" + "".join(f"\n{each}." for each in apart_words)
+    attributes["verdict"] = f"{names[best]}: {attributes['verdict']}" + "".join(f"\n{each}." for each in compared)
     return result.assign_attrs(attributes)
 
 

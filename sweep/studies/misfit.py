@@ -60,6 +60,10 @@ The places are so close together that their trajectories take the same steps.
 """
 
 
+Note = Callable[[str], None]
+"""Receives a message on the progress of a fit."""
+
+
 @dataclass
 class Problem:
     """A film, and the trajectories that should reproduce it."""

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import stats
 from scipy.special import ndtr
 
-from sweep.config import Config, ConfigError
+from sweep.config import Config
 from sweep.config.distributions import Distribution
 from sweep.config.film import Film
 from sweep.grid import Array
@@ -125,7 +125,7 @@ def _around(config: Config, parameter: Parameter, value: float, least: float, mo
     """Return the range from 1/5 to 5 times a positive value; up to twice one that may be negative, of either sign."""
     if value == 0:
         message = "give the ends of its range as two values, such as [-1, 1]: it is free, and zero sets no scale"
-        raise ConfigError([config.fault(parameter.place, message)])
+        raise config.error(parameter.place, message)
     if least >= 0:
         return Range.even(value / 5, min(value * 5, most), least=least, most=most)
     return Range.even(-2 * value, 2 * value, least, most)

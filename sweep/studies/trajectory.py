@@ -23,7 +23,7 @@ from sweep.engine.errors import results
 from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
 from sweep.engine.life import begin, live
 from sweep.engine.plan import plan, steps_of
-from sweep.engine.reporter import Progress, Reporter
+from sweep.engine.reporter import Count, Reporter
 from sweep.faults import duration, fault_of, refusal, suggestion
 from sweep.grid import SAMPLE, Array, Grid
 from sweep.interrupt import deferred
@@ -41,7 +41,7 @@ from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.kind import TRAJECTORY
 from sweep.results.provenance import provenance
-from sweep.studies.search import require_simulated
+from sweep.studies.study import require_simulated
 from sweep.units import Unit, named
 from sweep.variables import Variable
 
@@ -171,18 +171,13 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     (part,), (grid,) = job.parts, job.grids
     (each,), kernel, columns = begin([part]), part.kernel, grid.columns()
     images, steps = each.cells.images, part.step.copy()
-    t_end, began = chosen.integrator.t_end, time.perf_counter()
-
-    farthest = 0.0
+    t_end, count = chosen.integrator.t_end, Count(reporter, named(u.TIME, chosen.units) or "of time")
+    count.expect(len(images) * t_end, len(images) * t_end)
 
     def report() -> None:
-        nonlocal farthest
         table = kernel.table(images)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
-        farthest = max(farthest, float(covered))  # companions begin at t = 0 again
-        seconds = time.perf_counter() - began
-        unit = named(u.TIME, chosen.units) or "of time"
-        reporter.chunk(Progress(len(images) * t_end, farthest, 0, 0, seconds, unit))
+        count.chunk(float(covered), 0)  # companions begin at t = 0 again, which it leaves out
 
     marks = _run(each.cells, images, report)
     live([each], report)
@@ -196,7 +191,7 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     times = _times(kernel, images, every or intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, [each]))
-    made = provenance(chosen, time.perf_counter() - began, grid.size, of=TRAJECTORY)
+    made = provenance(chosen, time.perf_counter() - count.began, grid.size, of=TRAJECTORY)
     labelled = dataset.label(chosen, grid, found, made)
     flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
     index = ("trajectory", np.arange(grid.size), {"long_name": "trajectory"})
@@ -205,12 +200,10 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
 
 def _described(times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
     """Return the series over (trajectory, time), with their attributes, in the order of `SERIES`."""
-    own = {name: each for name, *each in model.series}
-    specs = {"time": (u.TIME, "time t"), **SERIES, **own}
-    words = {name: dataset.described(Variable("float64", *spec), system) for name, spec in specs.items()}
-    found: dict[str, Any] = {"time": ("time", times, words["time"])}
-    found |= {name: (("trajectory", "time"), series[name], words[name]) for name in words if name in series}
-    return xr.Dataset(found)
+    rows = {**SERIES, **{name: each for name, *each in model.series}}
+    specs = {name: Variable("float64", *row) for name, row in rows.items()}
+    time = xr.Variable("time", times, dataset.described(Variable("float64", u.TIME, "time t"), system))
+    return xr.Dataset(dataset.variables(specs, ("trajectory", "time"), series, system), {"time": time})
 
 
 def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> str:
@@ -220,13 +213,11 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     steps = integrator.t_end / steps_of(integrator.method, chosen, columns)[0]
     samples = (integrator.t_end / intervals(chosen.equations, columns)).sum()
     seconds = _PASSES * nominal_seconds(steps) + samples * _SAMPLE_SECONDS
-    return "\n".join(
-        [
-            f"trajectories: {len(steps)}",
-            f"steps:        at most {steps.sum():.3g}",
-            f"samples:      at most {samples:.3g}",
-            f"time:         at most about {duration(seconds)}",
-        ]
+    return (
+        f"trajectories: {len(steps)}\n"
+        f"steps:        at most {steps.sum():.3g}\n"
+        f"samples:      at most {samples:.3g}\n"
+        f"time:         at most about {duration(seconds)}"
     )
 
 
@@ -237,12 +228,10 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     """
     config = load_config(config, {} if samples is None else {"samples": samples})
     require_simulated(config)
-    config = replace(config, integrator=config.integrator.patient)
     method = METHODS.get(config.integrator.method)
-    if not (method and method.takes_every_step):
-        # A fixed step meant for another method may be unstable with dopri5.
-        plain = config.integrator.model_copy(update={"method": PLAIN, "step": "auto"})
-        config = replace(config, integrator=plain)
+    # A fixed step meant for another method may be unstable with dopri5.
+    other = {} if method and method.takes_every_step else {"method": PLAIN, "step": "auto"}
+    config = replace(config, integrator=config.integrator.patient.model_copy(update=other))
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
     drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}

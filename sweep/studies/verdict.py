@@ -147,14 +147,7 @@ def pressed(problem: Problem, best: Minimum, share: float = _BEYOND, fall: float
 
 
 def sentences(
-    problem: Problem,
-    verdict: Verdict,
-    values: Array,
-    limits: Array,
-    edge: Array,
-    words: Sequence[str],
-    *,
-    compared: bool,
+    problem: Problem, verdict: Verdict, values: Array, limits: Array, edge: Array, words: list[str], *, compared: bool
 ) -> str:
     """Return three sentences: how well the curve fits, what is known how accurately, and which film would show more.
 
@@ -187,9 +180,8 @@ def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
         return f"The fit cannot be trusted: {'; '.join(verdict.reasons)}{left}."
     if problem.film.error is not None:
         return f"The curve fits the film: it misses it by {verdict.size:.2g} times its errors{left}."
-    return (
-        f"The curve fits the film: it misses it by {verdict.size:.2g} {unit} (root mean square), which is noise{left}."
-    )
+    size = f"{verdict.size:.2g} {unit} (root mean square)"
+    return f"The curve fits the film: it misses it by {size}, which is noise{left}."
 
 
 def _known(config: Config, names: Sequence[str], values: Array, limits: Array, edge: Array) -> str:
@@ -228,18 +220,10 @@ def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
 
 
 _SLIPPING = "film the body as it slips and reverses: with a faster spin, or more tilt at the start"
+_AT_START = ("n0", "x0", "y0", "roll", "pitch", "omega1", "omega2", "omega3")
 _FILMS: Mapping[tuple[str, ...], str] = {
     ("sigma", "mu_viscous", "mu_rolling", "mu_spinning"): "continue filming until the body rests",
-    (
-        "n0",
-        "x0",
-        "y0",
-        "roll",
-        "pitch",
-        "omega1",
-        "omega2",
-        "omega3",
-    ): "begin the film when the hand lets go, with more rows per second",
+    _AT_START: "begin the film when the hand lets go, with more rows per second",
     UNKNOWNS: "also film one second of rest",
     BODY: "weigh and measure the body",
 }

@@ -24,7 +24,7 @@ import sweep
 from sweep.engine import executor, local
 from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
-from sweep.results.identity import Identity
+from sweep.results.provenance import Identity
 from sweep.results.store import StoreError
 from sweep.sources import versions
 

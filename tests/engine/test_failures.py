@@ -13,9 +13,9 @@ from support.runs import Heard, interrupt, lengthen, run_cells, same_numbers
 import sweep
 from sweep.config import load_config
 from sweep.engine import failures
+from sweep.engine.cells import APPROACH, COMPANION, Lives
 from sweep.engine.executor import execute
 from sweep.engine.life import begin, live
-from sweep.engine.lives import APPROACH, COMPANION, Lives
 from sweep.engine.plan import plan
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, SETTLED, TIME_LIMIT, TOPPLED

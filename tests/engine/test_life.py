@@ -8,7 +8,7 @@ from support.kernels import threads
 
 from sweep.config import load_config
 from sweep.engine import life
-from sweep.engine.lives import COMPANION, RUN, Lives
+from sweep.engine.cells import COMPANION, RUN, Lives
 from sweep.engine.plan import plan
 from sweep.kernels.kernel import Kernel
 

@@ -14,7 +14,7 @@ from support.runs import Stop, same_numbers
 
 import sweep
 from sweep.engine import executor, life
-from sweep.engine.lives import Lives
+from sweep.engine.cells import Lives
 from sweep.kernels.kernel import Kernel
 
 

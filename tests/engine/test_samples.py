@@ -16,7 +16,7 @@ from support.figures import maps
 from support.runs import Heard, same_numbers
 
 import sweep
-from sweep.config.distributions import Distribution, drawn
+from sweep.config.distributions import Distribution, chances, drawn
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 from sweep.grid import CASE, SAMPLE, Grid
@@ -47,7 +47,7 @@ def test_samples_are_of_their_distribution(ours: Distribution, scipy: stats.rv_c
     chance = np.linspace(0.001, 0.999, 99)
     np.testing.assert_allclose(ours.at(chance), scipy.ppf(chance), rtol=1e-12)
     assert ours.median == pytest.approx(scipy.median(), rel=1e-12)
-    samples = drawn({"a": ours, "b": ours}, 1024, 0)
+    samples = drawn({"a": ours, "b": ours}, chances(2, 1024, 0))
     for numbers in samples.values():
         assert stats.kstest(numbers, scipy.cdf).statistic < 0.003  # of random numbers 0.03
     assert abs(np.corrcoef(*samples.values())[0, 1]) < 0.01
@@ -55,7 +55,7 @@ def test_samples_are_of_their_distribution(ours: Distribution, scipy: stats.rv_c
 
 def test_more_samples_begin_with_the_fewer_and_another_seed_gives_others() -> None:
     known = {"n0": Distribution("normal", 0, 1), "x0": Distribution("uniform", 0, 1)}
-    few, more, others = drawn(known, 5, 1), drawn(known, 300, 1), drawn(known, 5, 2)
+    few, more, others = (drawn(known, chances(2, *how)) for how in ((5, 1), (300, 1), (5, 2)))
     for name in known:
         assert more[name][:5] == few[name]
         assert not set(others[name]) & set(few[name])

@@ -8,8 +8,8 @@ from support.runs import run_cells
 import sweep
 from sweep.config import load_config
 from sweep.engine import executor
+from sweep.engine.ending import whole_blocks
 from sweep.engine.plan import plan
-from sweep.engine.winding import whole_blocks
 from sweep.kernels.status import RUNNING, SETTLED
 from sweep.models.ladder import slip
 from sweep.models.stiff.precession import vertical_spin

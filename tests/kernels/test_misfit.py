@@ -19,6 +19,7 @@ from sweep.models.ladder import slip
 from sweep.models.model import take
 from sweep.results.store import StoreError
 from sweep.results.summary import describe
+from sweep.studies.study import measuring
 
 TEXT = """\
 name: film
@@ -50,6 +51,10 @@ def spins(times: np.ndarray) -> np.ndarray:
 def config(write: Write) -> Path:
     film(write, np.linspace(0, 150, 301))
     return write(TEXT)
+
+
+def test_a_search_follows_no_film(config: Path) -> None:
+    assert measuring(sweep.load_config(config)).film is None
 
 
 @pytest.mark.parametrize("method", ["dopri5", "adams"])

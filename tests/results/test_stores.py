@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sweep.results.checkpoint import Checkpoint
-from sweep.results.identity import Identity
+from sweep.results.provenance import Identity
 from sweep.results.store import Running, Store
 
 TILE = {

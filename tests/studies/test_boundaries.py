@@ -25,7 +25,7 @@ from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
 from sweep.studies.curve import Cell, Curve, Point
 from sweep.studies.roots import Root
-from sweep.studies.search import measuring
+from sweep.studies.study import measuring
 
 AXES: dict[str, Any] = {"mu": [60.0, 72.0, 84.0], "b": [3.0, 4.0]}
 SCENE = {

@@ -40,6 +40,12 @@ def test_the_nearest_change_is_found_and_none_is_made_up() -> None:
     assert (sweep.run(BODY, b=np.geomspace(1.5, 6, 61).tolist()).reversals <= 3).all()
 
 
+def test_no_start_off_the_body_is_tried() -> None:
+    """At twice its distance, or on a body half as long, it would lie there, and NumPy would warn of a root."""
+    found = sweep.changes(BODY, x0=6.0, reversals=-1)
+    assert not (found.changed_at.sel(parameter="x0") > 10).any()
+
+
 def test_a_body_in_si_changes_alike() -> None:
     length, gravity = 0.02, 9.80665
     rate = np.sqrt(gravity / length)

@@ -417,8 +417,11 @@ def test_an_animation_has_no_outlier_and_no_difference_that_the_film_has_not(fou
 
 
 def test_an_animation_of_several_laws_is_that_of_the_best(of_laws: xr.Dataset) -> None:
-    film, fit = (shown(of_laws).sel(trajectory=name) for name in ("film", "fit"))
+    late = of_laws.reindex(parameter=[*of_laws.parameter.values, "film_delay"])
+    late["value"].loc[{"parameter": "film_delay"}] = 0.25
+    film, fit = (shown(late).sel(trajectory=name) for name in ("film", "fit"))
     best = of_laws.sel(law="coulomb-sqrt")
+    assert fit.time[-1] == best.time[-1] + 0.25
     off = (best.seen - best.fitted).where(~best.outlier, drop=True)
     np.testing.assert_allclose((film.spin - fit.spin)[[0, -1]], off[[0, -1]], atol=1e-12)
 
