@@ -73,8 +73,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
-    figure = Picture(panel_width(1, 11, 0), 4.2 + 1.9 * rows)
-    figure.head(dataset.attrs.get("title", ""), labels.constants(constants_apart(dataset)))
+    figure = Picture(constants_apart(dataset), panel_width(1, 11, 0), 4.2 + 1.9 * rows)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
