@@ -52,7 +52,8 @@ def plot(
     target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
     dataset = opened(file)
     picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
-    for name, taken in panels.nearest(dataset, sel).items():
+    for name, i in panels.nearest(dataset, sel).items():
+        taken = float(dataset[name][i])
         say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
     say(f"wrote {target}")
 
