@@ -32,8 +32,9 @@ SECONDS = 10.0
 
 FRAMES_A_SECOND = 20
 
-MOST_FRAMES = 1200
-"""Largest number of frames in a gif or html, which stays in memory until it is written: a megabyte a frame."""
+_LONGEST, _LONGEST_IN_MEMORY = 3600.0, 60.0
+"""Largest duration of a clip in seconds, and of a gif or html, which stays in memory until it is written: a megabyte a
+frame."""
 
 _BEYOND = 2.0
 """End of a clip, relative to the latest first reversal of its bodies, which is thus in the middle."""
@@ -58,24 +59,27 @@ def animate(
     path = None if output is None else Path(output)
     if path is not None:
         check(path)
-    if speed is not None and not speed > 0:
-        raise fault_of(f"{speed:g}; give a number above zero", "speed")
+    if speed is not None and not 0 < speed < np.inf:
+        raise fault_of(f"{speed:g}; give a finite number above zero", "speed")
     shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if not body.drawable(shown):
         raise fault_of("has no attitude, or no a, b and c; animate trajectories of slip or noslip", "source")
     if (bodies := shown.sizes["trajectory"]) > MOST:
         raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}", "source")
-    last = float(shown["time"][-1])
+    first, last = map(float, shown["time"][[0, -1]])
+    begin = max(begin, first)
     end = min(_until(shown) if end is None else end, last)
     if not begin < end:
         words = f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}"
         raise fault_of(words, "begin")
     seconds = SECONDS if speed is None else (end - begin) / speed
+    in_memory = path is not None and suffix(path) != "mp4"
+    longest = _LONGEST_IN_MEMORY if in_memory else _LONGEST
+    if seconds > longest:
+        words = f"the clip would last {seconds:.3g} s, and may last {longest:.0f} s"
+        more = ", or write an mp4" if in_memory else ""
+        raise fault_of(f"{words}; give a speed of {(end - begin) / longest:.3g} or more{more}", "speed")
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
-    if path is not None and suffix(path) != "mp4" and count > MOST_FRAMES + 1:
-        longest = MOST_FRAMES / FRAMES_A_SECOND
-        words = f"the clip would last {seconds:.3g} s, and a {suffix(path)} at most {longest:.0f} s"
-        raise fault_of(f"{words}; give a speed of {(end - begin) / longest:.3g} or more, or write an mp4", "speed")
     scene = _Scene(shown, np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:
