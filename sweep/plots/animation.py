@@ -64,6 +64,8 @@ def animate(
     shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if not body.drawable(shown):
         raise fault_of("has no attitude, or no a, b and c; animate trajectories of slip or noslip", "source")
+    if not shown.sizes.get("trajectory") or not shown.sizes.get("time"):
+        raise fault_of("has no axis trajectory or time with values; use the dataset that sweep wrote", "source")
     if (bodies := shown.sizes["trajectory"]) > MOST:
         raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}", "source")
     first, last = map(float, shown["time"][[0, -1]])

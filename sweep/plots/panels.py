@@ -76,7 +76,10 @@ def choose(
     """
     dataset = dataset.isel(nearest(dataset, sel or {}))
     names, compared = _variables(dataset, variable, alone=alone)
-    dims = [str(d) for d in field(dataset, names[0]).dims]
+    first = field(dataset, names[0])
+    if first.dtype.kind not in "fiub":
+        raise fault_of(f"the values of {names[0]} are not numbers; choose another variable", "variable")
+    dims = [str(d) for d in first.dims]
     check(dataset, dims, names[0])
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:

@@ -117,6 +117,8 @@ def plot(
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
     if limits is not None and not (_is_pair(limits) and limits[0] < limits[1]):
         raise fault_of(refusal(limits, "a lower and a higher finite number, such as (0, 5)"), "limits")
+    if limits is not None and max(map(abs, limits)) > scales.LARGEST:
+        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {scales.LARGEST:g}", "limits")
     if figsize is not None and not (_is_pair(figsize) and min(figsize) > 0):
         raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
     if sel is not None and not isinstance(sel, Mapping):

@@ -121,6 +121,9 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^source: has no attitude"):
         animation.animate(turning().drop_vars("heading"))
+    for part in ({"trajectory": 0}, {"trajectory": []}, {"time": []}):
+        with pytest.raises(ConfigError, match=r"^source: has no axis trajectory or time"):
+            animation.animate(turning().isel(part))
     with pytest.raises(ConfigError, match=r"^source: .*at most 6"):
         animation.animate(turning(7))
     with pytest.raises(ConfigError, match=r"^begin: nothing lies between"):
