@@ -21,7 +21,6 @@ from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.figure import constants_in_lines, zero_line
 from sweep.plots.formats import suffix
-from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
 MOST = 6
@@ -52,16 +51,18 @@ FORMATS = ("gif", "mp4", "html")
 
 
 def animate(
-    dataset: xr.Dataset | str | Path, output: str | Path | None = None, *,
+    shown: xr.Dataset, output: str | Path | None = None, *,
     begin: float = 0.0, end: float | None = None, speed: float | None = None,
 ) -> FuncAnimation:  # fmt: skip
-    """Show how the bodies of trajectories turn; arguments, result and errors as of `sweep.animate`."""
+    """Show how the bodies of trajectories turn; arguments, result and errors as of `sweep.animate`.
+
+    Parameters
+    ----------
+    output : a file whose name `check` allows
+    """
     path = None if output is None else Path(output)
-    if path is not None:
-        check(path)
     if speed is not None and not 0 < speed < np.inf:
         raise fault_of(f"{speed:g}; give a finite number above zero", "speed")
-    shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
     if not body.drawable(shown):
         raise fault_of("has no attitude, or no a, b and c; animate trajectories of slip or noslip", "source")
     if not shown.sizes.get("trajectory") or not shown.sizes.get("time"):

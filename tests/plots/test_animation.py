@@ -141,7 +141,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
             animation.animate(turning(), name and tmp_path / name, end=8, speed=speed)
     without = mpl.rc_context({"animation.ffmpeg_path": "no-such-program"})
     with without, pytest.raises(ConfigError, match="ffmpeg, which is not installed"):
-        animation.animate(turning(), tmp_path / "clip.mp4")
+        animation.check(tmp_path / "clip.mp4")
     refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
 
 
