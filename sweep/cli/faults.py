@@ -60,17 +60,6 @@ def _renamed(error: ConfigError, options: Mapping[Any, str]) -> ConfigError:
     return ConfigError(map(named, error.faults))
 
 
-@contextmanager
-def needs_bokeh(what: str) -> Iterator[None]:
-    """Turn a missing Bokeh into an error that explains how to install it."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name not in ("bokeh", "tornado"):
-            raise
-        refuse(what, "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
-
-
 _PACKAGE = Path(__file__).parents[1]
 _FULL = {errno.ENOSPC, errno.EDQUOT}
 
