@@ -112,7 +112,7 @@ def check(path: Path) -> None:
 
 def _until(dataset: xr.Dataset) -> float:
     """Return the time at which a clip ends by default."""
-    times = [trajectories.reversal_times(dataset.isel(trajectory=i)) for i in range(dataset.sizes["trajectory"])]
+    times = list(map(trajectories.reversal_times, trajectories.each(dataset)))
     return _BEYOND * max((each[0] for each in times if len(each)), default=trajectories.lively_until(dataset))
 
 
@@ -128,7 +128,7 @@ class _Scene:
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
         zero_line(over_time)
-        ones = [dataset.isel(trajectory=i) for i in range(bodies)]
+        ones = trajectories.each(dataset)
         moving = [body.moving(one, times) for one in ones]
         half = max(each.reach for each in moving)  # one scale for all
         self.bodies = []
@@ -157,8 +157,7 @@ class _Body:
 
     def __init__(self, one: xr.Dataset, moving: body.Moving, times: Array, axes: Any, curve: Line2D) -> None:
         self.axes, self.curve, self.times, self.moving = axes, curve, times, moving
-        known = np.isfinite(one["heading"].values)
-        self.spin = np.interp(times, one["time"].values[known], one["spin"].values[known])
+        (self.spin,) = body.at(one, times, "spin")
         # Seen through the body, which covers most of it.
         (self.trace,) = axes.plot([], [], [], color="black", linewidth=1, zorder=3)
         (self.dot,) = axes.plot([], [], [], "o", color="black", markersize=3, zorder=3)
