@@ -346,7 +346,7 @@ def animate(
     source : a configuration, as for `run`, or a dataset of `trajectory` or `fit`, or the path of its file, which ends
         in .nc. For a fit, the film is shown beside the fitted body
     output : file to write; its suffix sets the format: gif, mp4 (needs ffmpeg) or html (a page that needs no network)
-    begin, end : the interval of time shown; by default until a third beyond the last of the bodies' first reversals
+    begin, end : the interval of time shown; by default until twice the latest of the bodies' first reversals
     speed : time shown per second of the clip; by default such that the clip takes ten seconds
     progress, reporter : as for `run`
     values : the cells and other values of a configuration, as for `trajectory`; a dataset takes none

@@ -3,6 +3,7 @@
 import csv
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,8 @@ from support.cli import invoke
 from support.processes import python
 
 from sweep.bench import hard, precision, report
-from sweep.bench.precision import Measured, Point
+from sweep.bench.precision import Effort, Measured, Point, Spread, in_turn
 from sweep.bench.reference import Spins, read_spins, spin_errors, whole_steps
-from sweep.bench.timing import Effort, Spread, in_turn
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models import MODELS
@@ -52,11 +52,11 @@ def test_times_of_the_reference_are_multiples_of_the_step() -> None:
 
 def test_works_take_turns_and_slow_ones_run_less_often() -> None:
     order: list[str] = []
-    works = {name: (lambda name=name: order.append(name)) for name in "ab"}
+    works = [partial(order.append, name) for name in "ab"]
     spreads = in_turn(works, Effort(repeats=4))
     assert order == list("abababab")
-    assert len(spreads["a"].values) == 4
-    assert len(in_turn(works, Effort(repeats=9, patience=0.0))["a"].values) == 3
+    assert len(spreads[0].values) == 4
+    assert len(in_turn(works, Effort(repeats=9, patience=0.0))[0].values) == 3
     assert f"{Spread(np.array([3.0, 1.0, 2.0])):.1f}" == "2.0 (1.0 … 3.0)"
 
 
@@ -72,7 +72,7 @@ from sweep.kernels.methods import METHODS
 METHODS["twin"] = replace(METHODS["dopri5"], name="twin", code=9)  # before anybody has read the registry
 
 from sweep.bench import hard, reference, report
-from sweep.bench.timing import Effort
+from sweep.bench.precision import Effort
 
 spins = reference.read_spins()
 bodies = {model: found.select(np.array([2, 3])) for model, found in spins.items()}
@@ -103,7 +103,7 @@ def test_a_tiny_run_reports_every_method(tmp_path: Path) -> None:
 
 
 def measured(method: str, error: float, cost: float) -> Measured:
-    return Measured(Point("slip", method, "μ = 60", 0.1, error, ()), Spread(np.array([cost])))  # type: ignore[arg-type]
+    return Measured(Point("slip", method, "μ = 60", 0.1, error, 1, print), Spread(np.array([cost])))
 
 
 def test_methods_are_compared_at_equal_error() -> None:

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sweep.bench.reference import Spins, comparisons, spin_errors, whole_steps
-from sweep.bench.timing import T_END, Effort, Spread, Work, in_turn, spread_out
+from sweep.engine.executor import execute, nominal_seconds
+from sweep.grid import Array
 from sweep.kernels import methods
+from sweep.kernels.kernel import Kernel
+from sweep.kernels.layout import LANES
 from sweep.models import MODELS
+from sweep.models.model import Columns
 from sweep.report.direct import make_kernel
 from sweep.report.rows import Section, Table
+
+T_END = 400.0
+"""The time for which `tolerance` bounds the error in spin, in sqrt(c/g)."""
 
 LOOSEST = 1e-3
 """The longest step tried is the automatic step for this tolerance."""
@@ -30,15 +40,48 @@ MARKERS = "so^vDP*X"
 
 
 @dataclass(frozen=True)
+class Effort:
+    """How much to measure; the defaults take about two minutes on two cores."""
+
+    trajectories: int = 512
+    repeats: int = 5
+    patience: float = 3.0
+    """Seconds after which a task that has run three times is not repeated again."""
+    rungs: int = 8
+    """Number of steps to try, each shorter than the last by sqrt(2)."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Repeated measurements of one quantity."""
+
+    values: Array
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.values))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The smallest and the largest value."""
+        return float(self.values.min()), float(self.values.max())
+
+    def __format__(self, form: str) -> str:
+        smallest, largest = self.ends
+        return f"{self.median:{form}} ({smallest:{form}} … {largest:{form}})"
+
+
+@dataclass(frozen=True)
 class Point:
-    """A step of a method: its error, and the runs that measure its cost."""
+    """A step of a method: its error, and the run of many trajectories that measures its cost."""
 
     model: str
     method: str
     case: str
     step: float
     error: float
-    work: Work
+    trajectories: int
+    run: Callable[[], Any]
 
 
 @dataclass(frozen=True)
@@ -57,8 +100,8 @@ class Measured:
 def measure(effort: Effort) -> list[Measured]:
     """Measure time against error for steps of every method of every model."""
     points = [point for group in _groups() for point in _ladder(*group, effort)]
-    times = in_turn({i: point.work for i, point in enumerate(points)}, effort)
-    return [Measured(point, Spread(1e3 / len(point.work) * times[i].values)) for i, point in enumerate(points)]
+    times = in_turn([point.run for point in points], effort)
+    return [Measured(p, Spread(1e3 / p.trajectories * each.values)) for p, each in zip(points, times, strict=True)]
 
 
 def _groups() -> Iterator[tuple[str, str, str, Spins]]:
@@ -76,17 +119,50 @@ def _ladder(model: str, method: str, case: str, reference: Spins, effort: Effort
     """Yield shorter and shorter steps, until the error stops falling."""
     kernel = make_kernel(method, MODELS[model], ())
     longest, _ = methods.automatic_step(method, MODELS[model], reference.columns, LOOSEST)
-    many = spread_out(reference.columns, effort.trajectories)
     best = np.inf
     for rung in range(effort.rungs):
         step = whole_steps(reference, longest / 2 ** (rung / 2))
         error = float(spin_errors(kernel, reference, step).max())
         if error < best:
-            work = Work(kernel, many, np.resize(step, effort.trajectories)).affordable(effort)
-            yield Point(model, method, case, float(np.median(step)), error, work)
+            count = _affordable(step, effort)
+            run = partial(_run, kernel, _spread_out(reference.columns, count), np.resize(step, count))
+            yield Point(model, method, case, float(np.median(step)), error, count, run)
         if error < FLOOR or error > 0.7 * best:
             return
         best = error
+
+
+def _affordable(step: Array, effort: Effort) -> int:
+    """Return how many trajectories should run in a third of the patience."""
+    count = effort.trajectories
+    seconds = nominal_seconds(T_END / np.resize(step, count))
+    while count > 2 * LANES and seconds > effort.patience / 3:
+        count, seconds = count // 2, seconds / 2
+    return count
+
+
+def _run(kernel: Kernel, columns: Columns, step: Array) -> None:
+    """Run trajectories from their parameters to `T_END`, start-up included."""
+    execute(kernel, kernel.images(columns, step, T_END))
+
+
+def _spread_out(columns: Columns, count: int) -> dict[str, Array]:
+    """Repeat the bodies of `columns` in `count` trajectories, whose spins differ by up to a thousandth."""
+    many = {name: np.resize(values, count) for name, values in columns.items()}
+    return many | {"n0": many["n0"] * (1 + 1e-3 * np.arange(count) / count)}
+
+
+def in_turn(works: Sequence[Callable[[], Any]], effort: Effort) -> list[Spread]:
+    """Time each task, in seconds. They run in turn, so that changes in the machine's speed affect all alike."""
+    times: list[list[float]] = [[] for _ in works]
+    for _ in range(effort.repeats):
+        for work, seconds in zip(works, times, strict=True):
+            if len(seconds) >= 3 and sum(seconds) > effort.patience:
+                continue
+            began = time.perf_counter()
+            work()
+            seconds.append(time.perf_counter() - began)
+    return [Spread(np.array(seconds)) for seconds in times]
 
 
 def section(found: list[Measured], effort: Effort) -> Section:
@@ -94,7 +170,7 @@ def section(found: list[Measured], effort: Effort) -> Section:
     heads = ["step", "largest error in spin", "ms per trajectory", "ns per step", "trajectories"]
     lines = [["model", "case", "method", *heads]]
     for each in found:
-        point, size = each.point, str(len(each.point.work))
+        point, size = each.point, str(each.point.trajectories)
         shown = (f"{point.step:.4g}", f"{point.error:.1e}", f"{each.cost:.3g}", f"{each.nanoseconds:.3g}", size)
         lines.append([point.model, point.case, point.method, *shown])
     caption = (

@@ -13,8 +13,7 @@ import numba
 
 from sweep.bench import precision
 from sweep.bench.hard import hard_cases
-from sweep.bench.precision import Measured
-from sweep.bench.timing import Effort
+from sweep.bench.precision import Effort, Measured
 from sweep.report import page
 from sweep.report.rows import Row
 from sweep.results.writing import replacing
@@ -53,4 +52,4 @@ def write_table(path: Path, found: list[Measured]) -> None:
         for each in found:
             point, times = each.point, each.cost
             figures = (f"{x:.6g}" for x in (point.step, point.error, times.median, *times.ends))
-            lines.writerow([point.model, point.method, point.case, *figures, len(times.values), len(point.work)])
+            lines.writerow([point.model, point.method, point.case, *figures, len(times.values), point.trajectories])

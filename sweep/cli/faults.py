@@ -36,39 +36,28 @@ def refuse(option: str | Path, message: str) -> NoReturn:
 @contextmanager
 def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
     """Prefix `option` to faults of parameters that were given by that option."""
-
-    def named(fault: Fault) -> Fault:
-        first, *rest = fault.path or ("",)
-        ours = not fault.file and (not first or first in known)
-        return replace(fault, path=(f"{option} {first}".rstrip(), *rest)) if ours else fault
-
+    options = {"": option, **{name: f"{option} {name}" for name in known}}
     try:
         yield
     except ConfigError as error:
-        raise ConfigError(list(map(named, error.faults))) from None
+        raise _renamed(error, options) from None
 
 
 def _in_options(error: ConfigError, command: click.Command) -> ConfigError:
     """Name the option in faults of an argument that was given on the command line."""
     options = {name: each.opts[0] for each in command.params if isinstance(each, click.Option)
                for name in (each.name, each.opts[0].lstrip("-"))}  # fmt: skip
+    return _renamed(error, options)
+
+
+def _renamed(error: ConfigError, options: Mapping[Any, str]) -> ConfigError:
+    """Put the option in the place of the first key of a fault's path, unless the fault lies in a file."""
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)
-        return fault if fault.file or first not in options else replace(fault, path=(options[str(first)], *rest))
+        return fault if fault.file or first not in options else replace(fault, path=(options[first], *rest))
 
     return ConfigError(map(named, error.faults))
-
-
-@contextmanager
-def needs_bokeh(what: str) -> Iterator[None]:
-    """Turn a missing Bokeh into an error that explains how to install it."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name not in ("bokeh", "tornado"):
-            raise
-        refuse(what, "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
 
 
 _PACKAGE = Path(__file__).parents[1]

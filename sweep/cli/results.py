@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from sweep import interrupt
-from sweep.cli.faults import DONE, needs_bokeh, refuse, say
+from sweep.cli.faults import DONE, refuse, say
 from sweep.cli.options import FILE, PATH, announce, parse_pair, parse_span
 from sweep.faults import brief
 from sweep.plots import formats
@@ -52,7 +52,8 @@ def plot(
     target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
     dataset = opened(file)
     picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
-    for name, taken in panels.nearest(dataset, sel).items():
+    for name, i in panels.nearest(dataset, sel).items():
+        taken = float(dataset[name][i])
         say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
     say(f"wrote {target}")
 
@@ -80,8 +81,12 @@ def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -
 
     Click a cell to run its trajectory. The page can be opened only on this machine; press Ctrl-C to stop.
     """
-    with needs_bokeh("explore"):
+    try:
         from sweep.explorer.server import serve
+    except ModuleNotFoundError as error:
+        if error.name not in ("bokeh", "tornado"):
+            raise
+        refuse("explore", "needs Bokeh, which is not installed: pip install 'rattleback-sweep[explore]'")
     from sweep.explorer.setup import Setup, usable
     from sweep.explorer.slices import open_source
 

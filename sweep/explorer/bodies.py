@@ -42,14 +42,11 @@ _TOGETHER = 256
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """A map of counts, of which a `share` is simulated."""
+    """A map of counts."""
 
     dataset: xr.Dataset
-    share: float
-
-    @property
-    def whole(self) -> bool:
-        return self.share == 1.0
+    whole: bool
+    """Whether all are simulated."""
 
     def values_at(self, index: Mapping[str, int]) -> dict[str, str]:
         """The count of a cell, in words."""
@@ -111,7 +108,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         if job:
             job.share = share
         dataset[COUNT].attrs["long_name"] = f"spin reversals, {_words(share)}, {changes(source, state.changed)}"
-        return Counts(dataset, share)
+        return Counts(dataset, share == 1.0)
 
     for spread in (_COARSE, 1):
         some = place[tuple(slice(None, None, spread) for _ in shape)]
@@ -121,14 +118,13 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
         yield (last := labelled())
         yield from _resting(last)
-    config = _counting(setup.config)
     for spread in _SPREADS:
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[possible[some] & ~simulated[some]]
         for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
             theirs = {name: values[cells] for name, values in columns.items()}
             with all_threads():
-                result = run(_of_cells(config, theirs, tuple(axes)), reporter=job)
+                result = run(_of_cells(setup.config, theirs, tuple(axes)), reporter=job)
             found[cells], status[cells], simulated[cells] = result["reversals"], result["status"], True
             yield labelled()
 
@@ -149,15 +145,10 @@ def _words(share: float) -> str:
     return "simulated" if share == 1.0 else f"foreseen, {share:.0%} simulated" if share else "foreseen"
 
 
-def _counting(config: Config) -> Config:
-    """Return the configuration whose runs estimate no errors, by the kernel that runs have by default."""
-    integrator = config.integrator.model_copy(update={"estimate_errors": False})
-    return replace(
-        config, measure=measures.default(config.equations), integrator=integrator, picture=(), samples=None, refine=0
-    )
-
-
 def _of_cells(config: Config, columns: Mapping[str, Array], axes: tuple[str, ...]) -> Config:
+    """Return the configuration of these cells, whose run estimates no errors and uses the usual kernel."""
     cases = {name: tuple(columns[name].tolist()) for name in axes}
     one = {name: Values.one(float(values[0])) for name, values in columns.items() if name not in axes}
-    return replace(config, parameters=one, cases=cases)
+    integrator = config.integrator.model_copy(update={"estimate_errors": False})
+    plain = replace(config, measure=measures.default(config.equations), picture=(), samples=None, refine=0)
+    return replace(plain, parameters=one, cases=cases, integrator=integrator)

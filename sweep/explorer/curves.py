@@ -14,7 +14,7 @@ from bokeh.plotting import figure
 from sweep.explorer.player import Player
 from sweep.explorer.runner import Curve
 from sweep.explorer.state import MAX_CELLS
-from sweep.explorer.style import CURVES, GRID, SOFT, style
+from sweep.explorer.style import CURVES, SOFT, style
 from sweep.grid import Array
 from sweep.plots import labels, theory
 
@@ -22,9 +22,6 @@ _STRETCHES = 3000
 """Number of stretches of a long curve; only the lowest and the highest sample of each are drawn."""
 
 _OVER_TIME = ("spin", "energy", "dissipated")
-
-_LEGEND = {"padding": 4, "spacing": 0, "label_text_font_size": "11px", "background_fill_alpha": 0.0,
-           "label_text_color": SOFT, "border_line_color": None}  # fmt: skip
 
 
 class Curves:
@@ -39,11 +36,11 @@ class Curves:
         self.energy.x_range = self.spin.x_range
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
         items = [slot.item for slot in self._slots]
-        self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend", **_LEGEND))
+        self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend"))
         self.spin.y_range.renderers = [item.renderers[0] for item in items]  # critical spins may be far away
         for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed")):
             self.energy.line([np.nan], [np.nan], color=SOFT, line_dash=dash, legend_label=words)
-        self.energy.legend.update(location="right", **_LEGEND)
+        self.energy.legend.location = "right"
         self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
         self.spin.hspan("spin", source=self._critical, line_color=SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
@@ -138,7 +135,6 @@ def _figure(height: int, name: str) -> Any:
         height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset",
         active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
-    plot.toolbar.update(logo=None, autohide=True)
-    plot.grid.grid_line_color = GRID
+    plot.toolbar.autohide = True
     style(plot)
     return plot

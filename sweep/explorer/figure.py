@@ -19,7 +19,7 @@ from bokeh.plotting import figure
 from sweep.explorer import style
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import State
-from sweep.explorer.style import SOFT, TILES
+from sweep.explorer.style import TILES
 from sweep.plots import labels, marks, places, theory
 from sweep.plots.description import Map, describe
 from sweep.plots.scales import Scale
@@ -32,12 +32,6 @@ _CUT_HEIGHT = 150
 
 LINES = {name: (dash, round(1.25 * width, 2)) for name, (dash, width) in theory.STYLES.items()}
 """Dashes of the lines over a map, and their widths in pixels."""
-
-_BAR = {
-    "width": 14, "padding": 6, "border_line_color": None, "major_tick_line_color": SOFT,
-    "bar_line_color": SOFT, "major_label_text_font_size": "12px", "background_fill_color": None,
-    "title_text_font_style": "normal", "major_label_text_color": SOFT, "title_text_color": SOFT,
-}  # fmt: skip
 
 
 class MapFigure:
@@ -143,7 +137,7 @@ def _bar(unit: str, scale: Scale, mapper: Any) -> models.ColorBar:
     return models.ColorBar(
         color_mapper=mapper,
         ticker=models.FixedTicker(ticks=list(ticks), minor_ticks=[]) if ticks else chosen_by_bokeh,
-        title=unit or None, formatter=style.numbers(), major_label_overrides=ticks, **_BAR,
+        title=unit or None, formatter=style.numbers(), major_label_overrides=ticks,
     )  # fmt: skip
 
 
@@ -197,7 +191,6 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
         tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom", toolbar_location="above",
         background_fill_color="#e8ebee",
     )  # fmt: skip
-    plot.toolbar.logo = None
     plot.grid.visible = False
     style.style(plot, across, up)
     plot.title.update(text_font_size="14px", text_font_style="bold")
@@ -218,7 +211,6 @@ def _cut(source: Source, axis: PlacedAxis, span: Any) -> dict[str, Any]:
     plot.scatter("at", "here", source=data, color="#d55e00", size=8)
     style.style(plot, axis)
     plot.title.update(text_font_size="12px", text_font_style="normal")
-    plot.grid.grid_line_color = style.GRID
     return {"plot": plot, "at": axis.place(axis.values), "values": axis.values, "symbol": labels.symbol(axis.name)}
 
 

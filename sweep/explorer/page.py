@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bokeh.document import Document
+from bokeh.themes import Theme
 from jinja2 import Environment
 
 from sweep.explorer import figure, style
@@ -26,6 +27,7 @@ PARTS: Any = Environment(autoescape=True).from_string(_text("page.parts.html")).
 
 def dress(document: Document, source: Source, query: str) -> None:
     """Give a document the page of the explorer, whose address shows `query`."""
+    document.theme = Theme(Path(__file__).with_name("page.theme.yaml"))
     document.title = str(source.dataset.attrs.get("title", Path(source.name).name))
     document.template = _text("page.html")
     document.template_variables.update(

@@ -67,7 +67,7 @@ class Dropped(Exception):
 class Job(Reporter):
     """A trajectory that a page waits for; `report` is called with the job, on the runner's thread, when it changes.
 
-    A subclass can search for something else: its `begin` yields results with an attribute `whole`.
+    A subclass can search for something else: its `begin` yields results, ever more of them, with an attribute `whole`.
     """
 
     cell: Cell
@@ -91,8 +91,30 @@ class Job(Reporter):
     _reported: float = 0.0
 
     def begin(self, setup: Setup) -> Iterator[Any]:
-        """Yield what is found, ever more of it; the last is `whole`."""
-        return run(setup, self.cell, self)
+        """Run the trajectory of the cell, with the usual measurements, to ever later times, and yield each curve.
+
+        The last one goes to `t_end`, or, once the trajectory has settled, a while after its last event
+        (`lively_until`).
+        """
+        parameters = {name: Values.one(value) for name, value in self.cell.items()}
+        usual, seconds = measures.default(setup.config.equations), 0.0
+        config = choose(replace(setup.config, parameters=parameters, measure=usual), {})
+        columns, integrator = config.grid.columns(), config.integrator
+        t_end = LONG if integrator.t_end >= FOREVER else integrator.t_end
+        t_end = min(t_end, MAX_STEPS * float(steps_of(integrator.method, config, columns)[0].min()))
+        every = max(float(intervals(config.equations, columns).min()), t_end / MAX_SAMPLES)
+        self.t_end = t_end
+        for until in (share * t_end for share in _STRETCHES):
+            began = time.perf_counter()
+            shorter = integrator.model_copy(update={"t_end": until})
+            one = trajectory(replace(config, integrator=shorter), every=every, reporter=self).isel(trajectory=0)
+            lively, seconds = lively_until(one), seconds + time.perf_counter() - began
+            still = one["status"] not in (RUNNING, TIME_LIMIT) and lively < one["time"][-1]
+            whole = bool(until == t_end or still or one["status"] in FAILURES)
+            one = one.sel(time=slice(0, lively)) if whole else one
+            yield Curve(one, reversal_times(one), seconds, whole)
+            if whole:
+                return
 
     def news(self, delay: str = "") -> None:
         """Report a change, unless the job is no longer needed."""
@@ -107,33 +129,6 @@ class Job(Reporter):
         self.share = max(self.share, progress.done / self.t_end)
         if time.perf_counter() - self._reported > _REPORT_EVERY:
             self.news()
-
-
-def run(setup: Setup, cell: Cell, job: Job | None = None) -> Iterator[Curve]:
-    """Run the trajectory of a cell, with the usual measurements, to ever later times, and yield each curve.
-
-    The last one goes to `t_end`, or, once the trajectory has settled, a while after its last event (`lively_until`).
-    """
-    parameters = {name: Values.one(value) for name, value in cell.items()}
-    usual, seconds = measures.default(setup.config.equations), 0.0
-    config = choose(replace(setup.config, parameters=parameters, measure=usual), {})
-    columns, integrator = config.grid.columns(), config.integrator
-    t_end = LONG if integrator.t_end >= FOREVER else integrator.t_end
-    t_end = min(t_end, MAX_STEPS * float(steps_of(integrator.method, config, columns)[0].min()))
-    every = max(float(intervals(config.equations, columns).min()), t_end / MAX_SAMPLES)
-    if job:
-        job.t_end = t_end
-    for until in (share * t_end for share in _STRETCHES):
-        began = time.perf_counter()
-        shorter = integrator.model_copy(update={"t_end": until})
-        one = trajectory(replace(config, integrator=shorter), every=every, reporter=job).isel(trajectory=0)
-        lively, seconds = lively_until(one), seconds + time.perf_counter() - began
-        still = one["status"] not in (RUNNING, TIME_LIMIT) and lively < one["time"][-1]
-        whole = bool(until == t_end or still or one["status"] in FAILURES)
-        one = one.sel(time=slice(0, lively)) if whole else one
-        yield Curve(one, reversal_times(one), seconds, whole)
-        if whole:
-            return
 
 
 class Runner:

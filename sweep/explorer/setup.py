@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from sweep.config import Config, ConfigError, Fault
+from sweep.config import ConfigError, Fault
 from sweep.config.user_models import SUFFIX
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
@@ -18,7 +18,7 @@ Announce = Callable[[str], None]
 
 
 class Setup:
-    """The configuration that runs the dataset's trajectories, and the default parameters of a cell.
+    """The parts of a dataset's configuration that trajectories need, and the default parameters of a cell.
 
     Parameters
     ----------
@@ -32,7 +32,14 @@ class Setup:
     """
 
     def __init__(self, source: Source, model: str | None = None, announce: Announce | None = None) -> None:
-        self.config = _configuration(source, _named(source, model) if model else {}, announce if model else None)
+        # The dataset may come from anybody: a model in it that is a file or an entry point runs only if the user names
+        # it.
+        config = configuration(source.dataset, *((_named(source, model), announce) if model else ()))
+        if not config.simulated:
+            raise ConfigError([])
+        medians = config.at_medians
+        there = [name for name in config.tier.parameters if name in medians.parameters]
+        self.config = replace(medians, parameters={name: medians.parameters[name] for name in there})
         here = source.parameters_at(tuple(self.config.parameters), dict.fromkeys(source.dims, 0))
         self.base: Cell = {name: here.get(name, v.numbers[0]) for name, v in self.config.parameters.items()}
 
@@ -67,17 +74,3 @@ def _named(source: Source, model: str) -> dict[str, str]:
     if words:
         raise ConfigError([Fault("", None, None, ("--model",), words)])
     return {"model": model, "model_sha256": str(wanted)}
-
-
-def _configuration(source: Source, named: dict[str, str], announce: Announce | None) -> Config:
-    """The parts of the dataset's configuration that trajectories need.
-
-    It may come from anybody, so a model in it that is a file or an entry point is refused and not run, unless the
-    user has named it.
-    """
-    config = configuration(source.dataset, named, announce)
-    if not config.simulated:
-        raise ConfigError([])
-    names = config.tier.parameters
-    config = config.at_medians
-    return replace(config, parameters={name: config.parameters[name] for name in names if name in config.parameters})

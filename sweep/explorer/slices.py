@@ -67,12 +67,9 @@ class Source:
         self.dims = dims
         ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in dims if d in dataset.coords}
         self.dataset = dataset.isel({d: o for d, o in ascending.items() if (np.diff(o) < 0).any()})
-        self.axes = {d: PlacedAxis(d, along(self.dataset, d)) for d in self._all_dims()}
-
-    def _all_dims(self) -> list[str]:
-        """The dimensions of the cells, followed by those along which a variable has several values per cell."""
-        of_cells = [v.dims for v in self.dataset.data_vars.values() if set(self.dims) & set(v.dims)]
-        return list(dict.fromkeys(map(str, chain(self.dims, *of_cells))))
+        # Those of the cells, followed by those along which a variable has several values per cell.
+        of_cells = [v.dims for v in self.dataset.data_vars.values() if set(dims) & set(v.dims)]
+        self.axes = {d: PlacedAxis(d, along(self.dataset, d)) for d in map(str, chain(dims, *of_cells))}
 
     @cached_property
     def variables(self) -> list[str]:

@@ -176,21 +176,18 @@ def read(
     if len(state.limits) == len(LIMITS) and not state.limits["low"] < state.limits["high"]:
         faults.append("low is not below high; the values set the ends of the colours")
         state = replace(state, limits={})
-    for text in query.get("with", ())[-1:]:
-        try:
-            cell = _cell(text, base, known)
-            state = replace(state, changed={n: v for n, v in cell.items() if n not in source.dims and v != base[n]})
-        except ValueError as fault:
-            faults.append(f"with={brief(text)}: {fault}")
-    asked, cells = query.get("cell", ()), list[Cell]()
-    for text in asked[:MAX_CELLS]:
-        try:
-            cells.append(_cell(text, base, known))
-        except ValueError as fault:
-            faults.append(f"cell={brief(text)}: {fault}")
+    asked = query.get("cell", ())
+    cells: dict[str, list[Cell]] = {"with": [], "cell": []}
+    for key, texts in (("with", query.get("with", ())[-1:]), ("cell", asked[:MAX_CELLS])):
+        for text in texts:
+            try:
+                cells[key].append(_cell(text, base, known))
+            except ValueError as fault:
+                faults.append(f"{key}={brief(text)}: {fault}")
     if len(asked) > MAX_CELLS:
         faults.append(f"{len(asked)} cells are too many; the first {MAX_CELLS} are drawn")
-    return replace(state, cells=tuple(cells)), faults
+    changed = {n: v for cell in cells["with"] for n, v in cell.items() if n not in source.dims and v != base[n]}
+    return replace(state, cells=tuple(cells["cell"]), changed=changed), faults
 
 
 def wrong_value(parameter: Parameter, value: float) -> str:

@@ -35,11 +35,6 @@ CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
 _TICKS = 12
 """Largest number of ticks of an axis whose values are listed one by one."""
 
-_AXES = {
-    "axis_line_color": SOFT, "major_tick_line_color": SOFT, "minor_tick_line_color": None,
-    "axis_label_text_font_style": "normal", "axis_label_text_font_size": "12px", "major_label_text_font_size": "12px",
-}  # fmt: skip
-
 _MOST = 4096
 """Colours of a palette."""
 
@@ -55,7 +50,7 @@ _EXAMPLE = "#21918c"
 def style(plot: Any, *shown: PlacedAxis) -> None:
     """Give the axes of a figure their style; uneven values of the axes `shown` are listed one by one."""
     for drawn in plot.axis:
-        drawn.update(formatter=numbers(), **_AXES)
+        drawn.formatter = numbers()
     for axis, drawn in zip(shown, (plot.xaxis[0], plot.yaxis[0]), strict=False):
         if axis.spacing == "uneven":
             ticks = [float(t) for t in range(0, len(axis.values), -(-len(axis.values) // _TICKS))]

@@ -12,7 +12,6 @@ from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 
 from sweep.explorer import bodies, controls, export, figure, page
 from sweep.explorer import state as states
-from sweep.explorer.chosen import CellControls
 from sweep.explorer.curves import Curves
 from sweep.explorer.page import PARTS
 from sweep.explorer.runner import Curve, Drawn, Job, Runner
@@ -69,7 +68,8 @@ class View:
         self._figures = Curves(str(PARTS.empty()))
         self._controls = controls.MapControls(self._source, self._change)
         self._body = controls.BodyControls(self._source, self._constants, self._known, self._change)
-        self._chosen = CellControls(self._source, self._base, self._known, self._edit, self._activate, self._remove)
+        edits = self._edit, self._activate, self._remove
+        self._chosen = controls.CellControls(self._source, self._base, self._known, *edits)
         self._document.js_on_event("document_ready", self._figures.player.moment)
         for root in (self._controls.root, self._notice, self._map, self._legend, self._body.root, self._cell,
                      self._figures.root, self._figures.player.root, self._chosen.root, self._buttons()):  # fmt: skip

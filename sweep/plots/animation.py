@@ -21,7 +21,6 @@ from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.figure import constants_in_lines, zero_line
 from sweep.plots.formats import suffix
-from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 
 MOST = 6
@@ -32,8 +31,9 @@ SECONDS = 10.0
 
 FRAMES_A_SECOND = 20
 
-MOST_FRAMES = 1200
-"""Largest number of frames in a gif or html, which stays in memory until it is written: a megabyte a frame."""
+_LONGEST, _LONGEST_IN_MEMORY = 3600.0, 60.0
+"""Largest duration of a clip in seconds, and of a gif or html, which stays in memory until it is written: a megabyte a
+frame."""
 
 _BEYOND = 2.0
 """End of a clip, relative to the latest first reversal of its bodies, which is thus in the middle."""
@@ -51,31 +51,38 @@ FORMATS = ("gif", "mp4", "html")
 
 
 def animate(
-    dataset: xr.Dataset | str | Path, output: str | Path | None = None, *,
+    shown: xr.Dataset, output: str | Path | None = None, *,
     begin: float = 0.0, end: float | None = None, speed: float | None = None,
 ) -> FuncAnimation:  # fmt: skip
-    """Show how the bodies of trajectories turn; arguments, result and errors as of `sweep.animate`."""
+    """Show how the bodies of trajectories turn; arguments, result and errors as of `sweep.animate`.
+
+    Parameters
+    ----------
+    output : a file whose name `check` allows
+    """
     path = None if output is None else Path(output)
-    if path is not None:
-        check(path)
-    if speed is not None and not speed > 0:
-        raise fault_of(f"{speed:g}; give a number above zero", "speed")
-    shown = dataset if isinstance(dataset, xr.Dataset) else open_dataset(Path(dataset))
+    if speed is not None and not 0 < speed < np.inf:
+        raise fault_of(f"{speed:g}; give a finite number above zero", "speed")
     if not body.drawable(shown):
         raise fault_of("has no attitude, or no a, b and c; animate trajectories of slip or noslip", "source")
+    if not shown.sizes.get("trajectory") or not shown.sizes.get("time"):
+        raise fault_of("has no axis trajectory or time with values; use the dataset that sweep wrote", "source")
     if (bodies := shown.sizes["trajectory"]) > MOST:
         raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}", "source")
-    last = float(shown["time"][-1])
+    first, last = map(float, shown["time"][[0, -1]])
+    begin = max(begin, first)
     end = min(_until(shown) if end is None else end, last)
     if not begin < end:
         words = f"nothing lies between the times {begin:g} and {end:g}; the trajectories end at {last:g}"
         raise fault_of(words, "begin")
     seconds = SECONDS if speed is None else (end - begin) / speed
+    in_memory = path is not None and suffix(path) != "mp4"
+    longest = _LONGEST_IN_MEMORY if in_memory else _LONGEST
+    if seconds > longest:
+        words = f"the clip would last {seconds:.3g} s, and may last {longest:.0f} s"
+        more = ", or write an mp4" if in_memory else ""
+        raise fault_of(f"{words}; give a speed of {(end - begin) / longest:.3g} or more{more}", "speed")
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
-    if path is not None and suffix(path) != "mp4" and count > MOST_FRAMES + 1:
-        longest = MOST_FRAMES / FRAMES_A_SECOND
-        words = f"the clip would last {seconds:.3g} s, and a {suffix(path)} at most {longest:.0f} s"
-        raise fault_of(f"{words}; give a speed of {(end - begin) / longest:.3g} or more, or write an mp4", "speed")
     scene = _Scene(shown, np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:
@@ -104,7 +111,7 @@ def check(path: Path) -> None:
 
 def _until(dataset: xr.Dataset) -> float:
     """Return the time at which a clip ends by default."""
-    times = [trajectories.reversal_times(dataset.isel(trajectory=i)) for i in range(dataset.sizes["trajectory"])]
+    times = list(map(trajectories.reversal_times, trajectories.each(dataset)))
     return _BEYOND * max((each[0] for each in times if len(each)), default=trajectories.lively_until(dataset))
 
 
@@ -120,7 +127,7 @@ class _Scene:
         across, up = (labels.label(dataset, name) for name in ("time", "spin"))
         over_time.set(xlim=(times[0], times[-1]), xlabel=across, ylabel=up)
         zero_line(over_time)
-        ones = [dataset.isel(trajectory=i) for i in range(bodies)]
+        ones = trajectories.each(dataset)
         moving = [body.moving(one, times) for one in ones]
         half = max(each.reach for each in moving)  # one scale for all
         self.bodies = []
@@ -149,8 +156,7 @@ class _Body:
 
     def __init__(self, one: xr.Dataset, moving: body.Moving, times: Array, axes: Any, curve: Line2D) -> None:
         self.axes, self.curve, self.times, self.moving = axes, curve, times, moving
-        known = np.isfinite(one["heading"].values)
-        self.spin = np.interp(times, one["time"].values[known], one["spin"].values[known])
+        (self.spin,) = body.at(one, times, "spin")
         # Seen through the body, which covers most of it.
         (self.trace,) = axes.plot([], [], [], color="black", linewidth=1, zorder=3)
         (self.dot,) = axes.plot([], [], [], "o", color="black", markersize=3, zorder=3)

@@ -82,15 +82,17 @@ def moving(one: xr.Dataset, times: Array) -> Moving:
     constants = SimpleNamespace(
         **{k: v[0] for k, v in zip(surface.constants, surface.of(columns, np.zeros(1)), strict=True)}
     )
-    known = np.isfinite(one["heading"].values)
-    heading, roll, pitch, *path = (
-        np.interp(times, one["time"].values[known], one[name].values[known])
-        for name in ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")
-    )
+    heading, roll, pitch, *path = at(one, times, "heading", "roll_angle", "pitch_angle", "table_x", "table_y")
     delta = float(one["delta"]) if "delta" in one else 0.0
     turns = rotation(heading, roll, pitch) @ Rotation.from_euler("z", -delta).as_matrix()
     contacts = np.array(contact_on(surface)(turns[:, 2, 0], turns[:, 2, 1], Vector(0.0, 0.0, 0.0), constants)[2]).T
     return Moving(_points(surface is ELLIPSOID, columns), turns, contacts, np.array(path))
+
+
+def at(one: xr.Dataset, times: Array, *names: str) -> list[Array]:
+    """Return series of a trajectory at the given times; after its end they keep their last values."""
+    known = np.isfinite(one["heading"].values)
+    return [np.interp(times, one["time"].values[known], one[name].values[known]) for name in names]
 
 
 def _points(ellipsoid: bool, columns: dict[str, Array]) -> Array:

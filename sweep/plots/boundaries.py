@@ -30,8 +30,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [(nothing, dataset)]
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)
-    figure = Picture(width * columns + 0.6, 1.2 + width * RATIO * rows)
-    figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
+    figure = Picture(dataset, width * columns + 0.6, 1.2 + width * RATIO * rows)
     scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int), None, None)
     for axes, (words, part) in zip(figure.panels(rows, columns, len(panels)), panels, strict=True):
         axes.set_title(words)

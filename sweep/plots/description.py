@@ -17,7 +17,7 @@ from sweep.plots import labels, scales, theory
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.plots.quantities import field
 from sweep.plots.scales import Limits, Scale
-from sweep.plots.theory import Line
+from sweep.plots.theory import Line, table
 from sweep.results.margins import Counts
 
 MARGINS = ("reversals", "margin_more", "margin_fewer", "status")
@@ -88,13 +88,6 @@ def along(dataset: xr.Dataset, dim: str) -> Array:
     if not dim:
         return np.zeros(1)
     return np.asarray(dataset[dim].values, float)
-
-
-def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:
-    """An array as a table of shape (y, x), repeated along an axis on which it does not vary."""
-    sizes = {y.name or "_y": len(y.values), x.name or "_x": len(x.values)}
-    template = xr.DataArray(np.zeros(list(sizes.values()), bool), dims=list(sizes))
-    return np.ascontiguousarray(array.drop_vars(array.coords).broadcast_like(template).transpose(*sizes).values)
 
 
 def common_scale(maps: Sequence[Map], limits: Limits | None = None, cmap: str | None = None) -> Scale:

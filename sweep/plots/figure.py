@@ -102,14 +102,19 @@ class Picture(Figure):
 
     Parameters
     ----------
+    dataset : gives the title, and the constant parameters, which are written above the legend
     width, height : in inches, for text of `TEXT` points
+    constants : whether the constant parameters are written
     """
 
-    def __init__(self, width: float, height: float) -> None:
+    def __init__(self, dataset: xr.Dataset, width: float, height: float, *, constants: bool = True) -> None:
         scale = mpl.rcParams["font.size"] / TEXT
         super().__init__((width * scale, height * scale), layout="constrained")
-        self._constants, self._width, self._height = "", width, height
+        self._width, self._height = width, height
+        self._constants = constants_in_lines(labels.constants(dataset), width) if constants else ""
         self._style: dict[Any, Any] = {name: mpl.rcParams[name] for name in _STYLE}
+        if title := dataset.attrs.get("title", ""):
+            self.suptitle(fill(title, max(1, int(width / _OF_TITLE))))
 
     def draw(self, renderer: RendererBase) -> None:
         with mpl.rc_context(self._style):
@@ -124,12 +129,6 @@ class Picture(Figure):
         stream = BytesIO()
         self.savefig(stream, format="png")
         return stream.getvalue()
-
-    def head(self, title: str, constants: str) -> None:
-        """Set the title, and the constant parameters, which are written above the legend."""
-        self._constants = constants_in_lines(constants, self._width)
-        if title:
-            self.suptitle(fill(title, max(1, int(self._width / _OF_TITLE))))
 
     def panels(self, rows: int, columns: int, count: int, **shared: Any) -> list[Axes]:
         """Make a grid of axes, whose last row may have fewer."""
@@ -292,8 +291,7 @@ def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, F
     """Make a figure with axes over `x` for each panel of a dataset, paired with the part to draw there."""
     rows, columns = arrangement(len(panels), 1.5 if is_column() else 2)
     high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell is written in words
-    figure = Picture(panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
-    figure.head(dataset.attrs.get("title", ""), labels.constants(dataset))
+    figure = Picture(dataset, panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
     frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))
     for k, (axes, panel) in enumerate(frames):
         lowest = k + columns >= len(panels)

@@ -29,8 +29,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     width = panel_width(1, 11, 0)
     sentences = [] if is_column() else verdict(dataset)
     lines = [line for each in sentences for line in textwrap.wrap(each, int(_LETTERS * width))]
-    figure = Picture(width, (3.6 if is_column() else 6) + 0.15 * len(lines))
-    figure.head(dataset.attrs.get("title", ""), "")
+    figure = Picture(dataset, width, (3.6 if is_column() else 6) + 0.15 * len(lines), constants=False)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     above.set_title("\n".join(lines), loc="left", fontsize="small")
     time, seen = dataset["time"].values, dataset["seen"].values

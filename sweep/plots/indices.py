@@ -15,8 +15,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     """Draw a panel for each quantity, with the share of its variance that comes from each parameter."""
     quantities = dataset["quantity"].values
     rows, columns = arrangement(len(quantities), 1) if page() < 3.2 * len(quantities) else (1, len(quantities))
-    figure = Picture(panel_width(columns, 3.2, 1) * columns + 1, 1 + 2.6 * rows)
-    figure.head(dataset.attrs.get("title", ""), "")
+    figure = Picture(dataset, panel_width(columns, 3.2, 1) * columns + 1, 1 + 2.6 * rows, constants=False)
     grid = figure.panels(rows, columns, len(quantities), sharey=True)
     places = np.arange(dataset.sizes["parameter"])
     for axes, quantity in zip(grid, quantities, strict=True):

@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.patheffects import withStroke
 
 from sweep.plots import labels, places
 from sweep.plots.description import Map
@@ -33,8 +33,9 @@ def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
     drawn, words = places.legible(shown.lines, shown.x, shown.y, room=labelled)
     for line in drawn:
         style = _STYLES[line.name]
+        halo = [withStroke(linewidth=2 * style["linewidth"], foreground="white")]
         for part in line.parts:
-            axes.plot(*part, color="black", path_effects=_halo(2 * style["linewidth"]), gid=line.name, **style)
+            axes.plot(*part, color="black", path_effects=halo, gid=line.name, **style)
     axes.axis(box)
     write(axes, words)
     return {line.words: entry(line.name, line.words) for line in drawn}
@@ -58,7 +59,3 @@ def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
 def entry(name: str, words: str) -> Line2D:
     """The entry of a legend for a line."""
     return Line2D([], [], color=mpl.rcParams["text.color"], label=words, **_STYLES[name])
-
-
-def _halo(width: float) -> list[AbstractPathEffect]:
-    return [withStroke(linewidth=width, foreground="white")]

@@ -74,9 +74,12 @@ def choose(
     ConfigError
         if there is no such variable or axis, or there would be too many panels.
     """
-    dataset = dataset.isel(_nearest(dataset, sel or {}))
+    dataset = dataset.isel(nearest(dataset, sel or {}))
     names, compared = _variables(dataset, variable, alone=alone)
-    dims = [str(d) for d in field(dataset, names[0]).dims]
+    first = field(dataset, names[0])
+    if first.dtype.kind not in "fiub":
+        raise fault_of(f"the values of {names[0]} are not numbers; choose another variable", "variable")
+    dims = [str(d) for d in first.dims]
     check(dataset, dims, names[0])
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
@@ -102,15 +105,15 @@ def choose(
     return Panels(dataset, whole, names, compared, across, indices(dataset, rest))
 
 
-def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, float]:
-    """Return the value of each axis of `sel` that is nearest to the requested one; `ConfigError` if there is no such
-    axis."""
-    return {name: float(dataset[name][i]) for name, i in _nearest(dataset, sel).items()}
+def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
+    """Return the index along each axis of `sel` of the value that is nearest to the requested one.
 
-
-def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
-    """Return the indices of these values along their axes."""
-    nearest = {}
+    Raises
+    ------
+    ConfigError
+        if there is no such axis, or no such value on it.
+    """
+    found = {}
     for name, wanted in sel.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
@@ -126,8 +129,8 @@ def _nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
         if not low - beyond <= at <= high + beyond:
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
             raise fault_of(f"{name} = {at:g} is far from all its values, {span}; choose one of them", "sel")
-        nearest[name] = int(np.abs(values - at).argmin())
-    return nearest
+        found[name] = int(np.abs(values - at).argmin())
+    return found
 
 
 def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:

@@ -12,7 +12,6 @@ from typing import Any, cast
 
 import matplotlib as mpl
 import xarray as xr
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -27,11 +26,10 @@ from sweep.plots import (
     labels,
     maps,
     panels,
-    probabilities,
     scales,
     trajectories,
 )
-from sweep.plots.figure import Frames, Picture, framed, is_asked, is_column, opaque, style
+from sweep.plots.figure import Picture, framed, is_asked, is_column, opaque, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
@@ -119,6 +117,8 @@ def plot(
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
     if limits is not None and not (_is_pair(limits) and limits[0] < limits[1]):
         raise fault_of(refusal(limits, "a lower and a higher finite number, such as (0, 5)"), "limits")
+    if limits is not None and max(map(abs, limits)) > scales.LARGEST:
+        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {scales.LARGEST:g}", "limits")
     if figsize is not None and not (_is_pair(figsize) and min(figsize) > 0):
         raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
     if sel is not None and not isinstance(sel, Mapping):
@@ -167,7 +167,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
     if len(chosen.across) == 2:
         return maps.draw(chosen, **how)
     figure, frames = framed(chosen.dataset, chosen.each, next(iter(chosen.across), ""))
-    figure.explain(_fill(chosen, frames, how["limits"]))
+    figure.explain(curves.draw(chosen, frames, how["limits"]))
     return figure
 
 
@@ -223,7 +223,7 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
         maps.draw_in(ax, chosen, **how)
         return
     ax.set_xlabel(labels.label(chosen.dataset, chosen.across[0]) if chosen.across else "")
-    _fill(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"])
+    curves.draw(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"])
 
 
 def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | None) -> None:
@@ -233,12 +233,6 @@ def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | Non
         raise fault_of(f"{name} is drawn as categories, which have no scale; leave them out", "limits")
     if cmap is not None and len(chosen.across) < 2:
         raise fault_of(f"{name} is drawn as a curve, which has no colour scale; leave it out", "cmap")
-
-
-def _fill(chosen: panels.Panels, frames: Frames, limits: Limits | None) -> list[Artist]:
-    """Draw the panels of a run other than maps; returns the entries for their legend."""
-    draw = probabilities.draw if chosen.names == ["probability"] else curves.draw
-    return draw(chosen, frames, limits)
 
 
 def _is_pair(given: Any) -> bool:

@@ -71,13 +71,13 @@ def counts(values: Array, limits: Limits | None = None, name: str | None = None)
     values : integers
     limits : lowest and highest count with their own colours; all counts beyond share one colour on either side
     """
-    low, high = _whole(limits) if limits else (int(values.min()), int(values.max()))
+    low, high = (round(float(end)) for end in limits or (values.min(), values.max()))
     return _stepped(low + _steps(high - low, _MAX_COUNTS), values, name or SEQUENTIAL)
 
 
 def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
     """A diverging scale of integers, symmetric about zero, which has its own colour."""
-    top = max(max(map(abs, _whole(limits))) if limits else int(np.abs(values).max(initial=0)), 1)
+    top = max(round(float(np.abs(limits or values).max(initial=0))), 1)
     side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
     return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
 
@@ -133,13 +133,6 @@ def _arrows(values: Array, low: float, high: float) -> Arrows:
     slack = 1e-9 * max(abs(low), abs(high))
     below, above = (values < low - slack).any(), (values > high + slack).any()
     return "both" if below and above else "min" if below else "max" if above else "neither"
-
-
-def _whole(limits: Limits) -> list[int]:
-    """The limits of a scale of integers; `ConfigError` if they are too large."""
-    if max(map(abs, limits)) > LARGEST:
-        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {LARGEST:g} for counts", "limits")
-    return [round(limit) for limit in limits]
 
 
 def _steps(top: int, most: int) -> Array:

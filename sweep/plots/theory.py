@@ -142,9 +142,15 @@ def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
 def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
     """Return the contours on which a critical spin equals the start spin of the map."""
     across, up = _axis(values, x), _axis(values, y)
-    template = xr.DataArray(np.zeros((len(up.values), len(across.values))), dims=(y.name, x.name))
-    field = values.drop_vars(values.coords).broadcast_like(template).transpose(y.name, x.name).values
+    field = table(values, across, up)
     return list(contours(1 / field, across, up, 1 / n0)) if n0 else []  # n_c is infinite for a round body
+
+
+def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:
+    """An array as a table of shape (y, x), repeated along an axis on which it does not vary."""
+    sizes = {y.name or "_y": len(y.values), x.name or "_x": len(x.values)}
+    template = xr.DataArray(np.zeros(list(sizes.values()), bool), dims=list(sizes))
+    return np.ascontiguousarray(array.drop_vars(array.coords).broadcast_like(template).transpose(*sizes).values)
 
 
 def _axis(values: xr.DataArray, axis: Axis) -> Axis:

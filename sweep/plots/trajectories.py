@@ -73,8 +73,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
-    figure = Picture(panel_width(1, 11, 0), 4.2 + 1.9 * rows)
-    figure.head(dataset.attrs.get("title", ""), labels.constants(constants_apart(dataset)))
+    figure = Picture(constants_apart(dataset), panel_width(1, 11, 0), 4.2 + 1.9 * rows)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}
@@ -103,8 +102,7 @@ def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
 
 def _spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> list[Artist]:
     """Draw the spins; returns the entries for the legend."""
-    for i in range(dataset.sizes["trajectory"]):
-        times = reversal_times(dataset.isel(trajectory=i))
+    for i, times in enumerate(map(reversal_times, each(dataset))):
         axes.plot(times, np.zeros(len(times)), "o", color=f"C{i}", markersize=4)
     entries = _series(axes, dataset, {"spin": "spin n"})
     zero_line(axes)
@@ -121,8 +119,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
     # Oscillations are so dense that an opaque curve would hide those below it.
     alone = dataset.sizes["trajectory"] == 1 or "spin" in names
     shades = _SHADES if len(names) > 1 else (1.0 if alone else 0.7,)
-    for i in range(dataset.sizes["trajectory"]):
-        one = dataset.isel(trajectory=i)
+    for i, one in enumerate(each(dataset)):
         for shade, name in zip(shades, names, strict=True):
             (line,) = axes.plot(one["time"], one[name], linewidth=0.8, color=f"C{i}", alpha=shade)
             line.set(label=label(dataset, i), gid=name, rasterized=one.sizes[one[name].dims[0]] > 5000)
@@ -143,8 +140,8 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
 def _critical_spins(axes: Axes, dataset: xr.Dataset) -> list[Artist]:
     """Draw lines at the critical spins of each body; among several bodies, in the colour of its first trajectory."""
     bodies: dict[tuple[tuple[str, str, float, str], ...], int] = {}
-    for i in range(dataset.sizes["trajectory"]):
-        bodies.setdefault(tuple(theory.levels(dataset.isel(trajectory=i))), i)
+    for i, one in enumerate(each(dataset)):
+        bodies.setdefault(tuple(theory.levels(one)), i)
     entries: dict[str, Line2D] = {}
     for body, i in bodies.items():
         colour = "0.4" if len(bodies) == 1 else f"C{i}"
@@ -162,12 +159,12 @@ def lively_until(dataset: xr.Dataset) -> float:
     The last event of a body that has settled is its last reversal.  For any other body it is the last notable change
     of a series other than heading and path, which change for ever.
     """
-    last = max(_last_event(one) for one in _each(dataset))
+    last = max(_last_event(one) for one in each(dataset))
     end = float(dataset["time"][-1])
     return min(_WHILE * last, end) if last else end
 
 
-def _each(dataset: xr.Dataset) -> list[xr.Dataset]:
+def each(dataset: xr.Dataset) -> list[xr.Dataset]:
     """The trajectories of a dataset, or the dataset itself if it is a single one."""
     count = dataset.sizes.get("trajectory")
     return [dataset] if count is None else [dataset.isel(trajectory=i) for i in range(count)]

@@ -65,7 +65,6 @@ def simulate(
     method: str = methods.PLAIN,
     step: float | Array | None = None,
     tolerance: float = TOLERANCE,
-    ranges: bool = True,
     settle: bool = False,
     decide: bool = False,
 ) -> Ends:
@@ -76,18 +75,17 @@ def simulate(
     columns : physical parameters by name, each of shape (cells,)
     t_end : time limit in sqrt(c/g)
     step : in sqrt(c/g), for all or of shape (cells,); by default the automatic one of `tolerance`
-    ranges : whether the kernel is given the spins at which the rattle decays; without them nothing settles
     settle : whether a trajectory ends as soon as it has settled
-    decide : whether a failure is repeated with shorter steps until it is certain, as `sweep.run` does; needs `ranges`
+    decide : whether a failure is repeated with shorter steps until it is certain, as `sweep.run` does
     """
     chosen = MODELS[model]
     kernel = make_kernel(method, chosen)
     cells = len(columns["a"])
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
-    stable = predict(chosen, Grid({}, {}, dict(columns))).ranges if ranges else None
+    stable = predict(chosen, Grid({}, {}, dict(columns))).ranges
     steps = np.broadcast_to(steps, cells).astype(float)
     images = kernel.images(columns, steps, t_end, stable)
-    if decide and stable is not None:
+    if decide:
         rules = Rules(t_end, tolerance, settles=settle)
         lives = begin([Cells(kernel, chosen, rules, np.arange(cells), columns, steps, np.zeros(cells), stable, images)])
         live(lives)

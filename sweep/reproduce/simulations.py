@@ -38,8 +38,10 @@ def configure(
     return load_config(settings, {name: values for name, values in parameters.items() if name in tier.parameters})
 
 
-def _figure(width: float, height: float) -> Figure:
-    return Figure(figsize=(width, height), dpi=100, layout="constrained")
+def _figure(width: float, height: float, rows: int = 1, columns: int = 1, **shared: Any) -> tuple[Figure, Any]:
+    """Make a figure of this size in inches, and its axes."""
+    figure = Figure(figsize=(width, height), dpi=100, layout="constrained")
+    return figure, figure.subplots(rows, columns, **shared)
 
 
 def slip_ratio() -> Section:
@@ -47,8 +49,8 @@ def slip_ratio() -> Section:
     both = trajectory(configure(t_end=400.0), mu=[100, 200])
     section = Section("Is dv_p/dt small compared with dv_0/dt?")
     for i, mu in enumerate((100, 200)):
-        figure = _figure(8, 3)
-        for axes, component in zip(figure.subplots(1, 2), (1, 2), strict=True):
+        figure, pair = _figure(8, 3, columns=2)
+        for axes, component in zip(pair, (1, 2), strict=True):
             # Starting without slip makes it jump once; the figures show the amplitudes after the jump.
             late = both.isel(trajectory=i, time=both["time"].values > 1.0)
             v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
@@ -66,8 +68,8 @@ def slip_ratio() -> Section:
 def critical_spins() -> Section:
     """Check fig. nc21pm: below n_c1 the rattle decays, above n_c2 the spin reverses."""
     section = Section("Spins below, between and above the critical ones, μ = 75")
-    figure = _figure(8, 6.5)
-    for axes, starts in zip(figure.subplots(2, 1), ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
+    figure, pair = _figure(8, 6.5, rows=2)
+    for axes, starts in zip(pair, ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
         three = trajectory(configure(t_end=8000.0), mu=75, n0=starts, every=2.0)
         draw_spin(axes, three)
         for i, (n0, grows, reverses) in enumerate(zip(starts, (False, True, True), (False, False, True), strict=True)):
@@ -88,8 +90,7 @@ def _behaviour(grows: bool, reverses: bool) -> str:
 def friction() -> Section:
     """Check fig. mu601000: counts at three frictions, and the approach to rolling."""
     section = Section("From three reversals to rolling")
-    figure = _figure(8, 6.5)
-    top, bottom = figure.subplots(2, 1)
+    figure, (top, bottom) = _figure(8, 6.5, rows=2)
     three = trajectory(configure(), mu=[60, 130, 200], every=3.0)
     draw_spin(top, three.sel(time=slice(0, 6000)), critical=False)
     for i, mu in enumerate((60, 130, 200)):
@@ -128,8 +129,7 @@ def count_against_friction() -> Section:
     rough = mu > 70
     larger = float((theirs >= ours)[rough].mean())
     low, high = (float((ours == theirs)[part].mean()) for part in (~rough, rough))
-    figure = _figure(7, 3.6)
-    axes = figure.subplots()
+    figure, axes = _figure(7, 3.6)
     axes.plot(mu, theirs, "s", fillstyle="none", label="n_r:ap, predicted")
     axes.plot(mu, ours, "x", label="n_r:ex, simulated")
     axes.set(xlabel="μ", ylabel="n_r")
@@ -148,8 +148,7 @@ def count_against_shape() -> Section:
     """Check figs. vsb and lf: reversals against b, next to the form factor."""
     b = np.linspace(1.2, 9.8, 87)
     maps = run(configure(mu=np.array([100.0, 200.0]), b=b))
-    figure = _figure(7, 6)
-    top, bottom = figure.subplots(2, 1, sharex=True)
+    figure, (top, bottom) = _figure(7, 6, rows=2, sharex=True)
     section = Section("Reversals against shape", figures=[("vsb and lf: counts and form factor against b", figure)])
     factor = analytic.form_factor(standard(b=b))
     best = analytic.best_b(10.0)
@@ -189,8 +188,7 @@ def ladder() -> Section:
     full = maps["slip"]
     errors = (f"error of the {which} reversal (median)" for which in ("first", "last"))
     lines = [["model", "equal counts", "within one", *errors, "trajectories/s"]]
-    figure = _figure(12, 3.6)
-    panels = figure.subplots(1, 3, sharey=True)
+    figure, panels = _figure(12, 3.6, columns=3, sharey=True)
     for name, axes in zip(("effective", "averaged", "analytic"), panels, strict=True):
         off = maps[name]["reversals"].astype(int) - full["reversals"].astype(int)
         mesh = axes.pcolormesh(b, mu, off.transpose("mu", "b"), cmap="RdBu_r", vmin=-6, vmax=6, shading="nearest")

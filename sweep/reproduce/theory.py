@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
@@ -14,12 +13,9 @@ from sweep.models.ladder import analytic
 from sweep.models.model import stack
 from sweep.models.theory import stability
 from sweep.models.theory.coefficients import coefficients
-from sweep.report import direct
-from sweep.report.direct import standard
+from sweep.report.direct import simulate, standard
 from sweep.report.rows import Row, Section, against, below
 from sweep.reproduce.rows import against_paper
-
-simulate = partial(direct.simulate, ranges=False)
 
 
 def formulas() -> Section:

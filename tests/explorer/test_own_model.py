@@ -11,7 +11,8 @@ from support.own import PENDULUM
 
 import sweep
 from sweep.config import ConfigError
-from sweep.explorer import export, runner, state
+from sweep.explorer import export, state
+from sweep.explorer.runner import Job
 from sweep.explorer.setup import Setup, usable, why_still
 from sweep.explorer.slices import Source, open_source
 from sweep.explorer.state import State
@@ -55,7 +56,8 @@ def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, 
     (words,) = said
     assert words.startswith(f"running the code of {folder / 'pendulum.py'} (SHA-256 ")
     index = {"damping": 1, "torque": 2}
-    *_, curve = runner.run(setup, {**setup.base, **source.parameters_at(tuple(setup.base), index)})
+    cell = {**setup.base, **source.parameters_at(tuple(setup.base), index)}
+    *_, curve = Job(cell, lambda _: None).begin(setup)
     for name in ("reversals", "t_stop", "spin_final"):
         assert curve.dataset[name].item() == source.dataset[name].isel(index).item()
     assert len(curve.reversals) == curve.dataset["reversals"] > 5

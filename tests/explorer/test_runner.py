@@ -27,7 +27,7 @@ def cell_at(source: Source, setup: Setup, **index: int) -> dict[str, float]:
 
 def whole(setup: Setup, cell: Cell) -> Curve:
     """The curve of a cell when it is over."""
-    *_, curve = runner.run(setup, cell)
+    *_, curve = Job(cell, lambda _: None).begin(setup)
     return curve
 
 
@@ -57,7 +57,7 @@ def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
 
 def test_a_curve_grows(source: Source, setup: Setup) -> None:
     """Its first stretch, which takes a small part of the time, is the beginning of the whole."""
-    first, *later = runner.run(setup, cell_at(source, setup, mu=3, b=2, n0=1))
+    first, *later = Job(cell_at(source, setup, mu=3, b=2, n0=1), lambda _: None).begin(setup)
     assert not first.whole
     assert [curve.whole for curve in later] == [False, False, False, False, True][-len(later) :]
     last = later[-1].dataset
@@ -115,14 +115,14 @@ def test_nothing_is_heard_of_dropped_jobs(setup: Setup, monkeypatch: pytest.Monk
     """The running one ends at its next chunk, and the waiting one is never begun."""
     begun, inside, go_on = list[float](), threading.Event(), threading.Event()
 
-    def slow(_: Setup, cell: Cell, reporter: Job) -> Iterator[Curve]:
-        begun.append(cell["mu"])
+    def slow(job: Job, _: Setup) -> Iterator[Curve]:
+        begun.append(job.cell["mu"])
         inside.set()
         assert go_on.wait(60)
-        reporter.chunk(Progress(1, 0.5, 0, 0, 1.0))
+        job.chunk(Progress(1, 0.5, 0, 0, 1.0))
         yield Curve(xr.Dataset(), np.zeros(0), 0.0)
 
-    monkeypatch.setattr(runner, "run", slow)
+    monkeypatch.setattr(Job, "begin", slow)
     running, first, second, third = Runner(setup), *(Heard({"mu": mu}) for mu in (1.0, 2.0, 3.0))
     for job in (first, second, third):
         running.submit(job)
@@ -143,7 +143,7 @@ def test_compiling_is_announced_to_all_who_wait(setup: Setup, monkeypatch: pytes
             assert go_on.wait(60)
         yield Curve(xr.Dataset(), np.zeros(0), 0.0)
 
-    monkeypatch.setattr(runner, "run", compile_first)
+    monkeypatch.setattr(Job, "begin", compile_first)
     running, first, second = Runner(setup), Heard({"mu": 1.0}), Heard({"mu": 2.0})
     running.submit(first)
     assert inside.wait(60)

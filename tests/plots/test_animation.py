@@ -121,20 +121,27 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"^source: has no attitude"):
         animation.animate(turning().drop_vars("heading"))
+    for part in ({"trajectory": 0}, {"trajectory": []}, {"time": []}):
+        with pytest.raises(ConfigError, match=r"^source: has no axis trajectory or time"):
+            animation.animate(turning().isel(part))
     with pytest.raises(ConfigError, match=r"^source: .*at most 6"):
         animation.animate(turning(7))
     with pytest.raises(ConfigError, match=r"^begin: nothing lies between"):
         animation.animate(turning(), begin=11)
-    for speed in (0, -5, np.nan):
-        with pytest.raises(ConfigError, match=f"speed: {speed:g}; give a number above zero"):
+    with pytest.raises(ConfigError, match=r"^begin: nothing lies between"):
+        animation.animate(turning(), begin=-np.inf, end=-1)
+    for speed in (0, -5, np.nan, np.inf):
+        with pytest.raises(ConfigError, match=f"speed: {speed:g}; give a finite number above zero"):
             animation.animate(turning(), speed=speed)
-    with pytest.raises(
-        ConfigError, match=r"speed: the clip would last 80 s, and a gif at most 60 s; give a speed of 0.133"
+    for name, speed, words in (
+        ("clip.gif", 0.1, "80 s, and may last 60 s; give a speed of 0.133 or more, or write an mp4$"),
+        (None, 1e-300, r"8e\+300 s, and may last 3600 s; give a speed of 0.00222 or more$"),
     ):
-        animation.animate(turning(), tmp_path / "clip.gif", end=8, speed=0.1)
+        with pytest.raises(ConfigError, match=f"speed: the clip would last {words}"):
+            animation.animate(turning(), name and tmp_path / name, end=8, speed=speed)
     without = mpl.rc_context({"animation.ffmpeg_path": "no-such-program"})
     with without, pytest.raises(ConfigError, match="ffmpeg, which is not installed"):
-        animation.animate(turning(), tmp_path / "clip.mp4")
+        animation.check(tmp_path / "clip.mp4")
     refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
 
 

@@ -64,8 +64,9 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
         assert scale.norm.Ncmap <= 24
         assert scale.norm.boundaries[-1] > top
     assert perf_counter() - start < 5
-    with pytest.raises(ConfigError, match=r"limits: 0\.\.1e\+16; give numbers up to 1e\+15 for counts"):
-        picture.plot(made(), "reversals", limits=(0, 1e16))
+    for variable in ("reversals", "spin_final"):
+        with pytest.raises(ConfigError, match=r"limits: 0\.\.1e\+16; give numbers up to 1e\+15$"):
+            picture.plot(made(), variable, limits=(0, 1e16))
 
 
 @pytest.mark.parametrize(
@@ -76,6 +77,7 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
         (lambda d: d.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
         (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
         (lambda d: d[["n_c1_plus"]], "name the variable to draw; choose n_c1_plus"),
+        (lambda d: d.assign(reversals=d["reversals"].astype(str)), "variable: the values of reversals are not numbers"),
         (lambda d: d[["n_c1_plus"]].drop_vars("n_c1_plus").assign_attrs(sweep_kind="run"), "has no variable to draw"),
     ],
 )
