@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import netCDF4
 import pytest
@@ -13,7 +12,7 @@ import xarray as xr
 from rich.console import Console
 from support import Write
 from support.cli import invoke, refused
-from support.runs import same_numbers
+from support.runs import interrupt, same_numbers
 
 import sweep
 from sweep.jit import Cached, compiling
@@ -22,7 +21,7 @@ from sweep.progress import Terminal
 
 def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     result = invoke("run", write(), "--output", tmp_path / "out")
-    assert result.exit_code == 0
+    assert (result.exit_code, "resuming" in result.stderr) == (0, False)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"small.nc", "small.png"}
     told = invoke("info", tmp_path / "out" / "small.nc").stdout
     assert "12 cells (mu 2 × b 3 × n0 2)" in result.stdout
@@ -80,15 +79,22 @@ def test_a_dry_run_compiles_computes_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_the_command_that_resumes_is_told(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: Any) -> None:
-        raise KeyboardInterrupt
+RESUMED = "interrupted: no cells finished and kept; the same command without --fresh resumes the run\n"
 
-    monkeypatch.setattr("sweep.results.folder.RunFiles.locked", interrupt)
-    result = invoke("run", write(), "--output", tmp_path, "--fresh")
-    assert result.exit_code == 130
-    said = "interrupted: no cells finished and kept; the same command without --fresh resumes the run\n"
-    assert result.stderr == said
+
+@pytest.mark.parametrize(
+    ("command", "during", "said"),
+    [
+        ("run --fresh", "sweep.results.folder.RunFiles.locked", RESUMED),
+        ("critical", "sweep.config.load_config", "interrupted\n"),
+    ],
+)
+def test_an_interrupt_is_one_line(
+    command: str, during: str, said: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(during, lambda *_, **__: interrupt())
+    result = invoke(*command.split(), write(), "--output", tmp_path)
+    assert (result.exit_code, result.stderr) == (130, said)
 
 
 def test_too_many_failures(write: Write, tmp_path: Path) -> None:
@@ -97,9 +103,8 @@ def test_too_many_failures(write: Write, tmp_path: Path) -> None:
     assert result.exit_code == 3
     assert "50.00% of the cells failed; max_failed_fraction allows 1.00%" in result.stderr
     assert (tmp_path / "out" / "small.nc").exists()
-    assert (
-        invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5").exit_code == 0
-    )
+    allowed = invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5")
+    assert allowed.exit_code == 0
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +10,7 @@ import pytest
 import xarray as xr
 from support import ROOT, Write
 from support.cli import invoke, refused
+from support.processes import python
 
 import sweep
 from sweep.cli import environment
@@ -88,10 +88,7 @@ def test_a_threading_layer_whose_library_is_missing_is_a_line(monkeypatch: pytes
 
 def test_a_backend_that_is_not_installed_is_not_asked_for(file: Path) -> None:
     """Matplotlib takes it from the environment when it is imported, and a notebook sets one that only it has."""
-    command = [sys.executable, "-m", "sweep", "plot", str(file)]
-    environment = {**os.environ, "MPLBACKEND": "nobody_has_it"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert python("-m", "sweep", "plot", file, MPLBACKEND="nobody_has_it").stderr == ""
 
 
 VERBS = ["run", "trajectory", "critical", "boundaries --x n0 --y mu --set n0=[0.02,0.05]"]
@@ -143,11 +140,16 @@ def test_a_file_that_cannot_be_written_is_named_and_not_its_temporary_one(
     assert str(refusal.value) == f"{tmp_path / 'x.png'}: cannot be written: Read-only file system"
 
 
+def test_a_picture_needs_a_free_name_in_a_folder_that_is_there(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "folder.png").mkdir()
+    for target in ("folder.png", "nowhere/x.png"):
+        refused(invoke("plot", file, "--output", tmp_path / target), "cannot be written: ")
+
+
 def test_a_missing_file_that_has_the_name_of_an_example_says_how_to_get_it(tmp_path: Path) -> None:
     for name in ("quick", "quick.yaml"):
         refused(invoke("run", tmp_path / name), f"{name}: no such file; `sweep examples quick` copies the example of")
     refused(invoke("animate", tmp_path / "quick"), "`sweep examples quick`")
-    refused(invoke("run", tmp_path / "mine.yaml"), "mine.yaml: no such file")
 
 
 CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {

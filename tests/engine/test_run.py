@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from support import Write
 from support.kernels import images, kernel
-from support.runs import Stop, same_numbers
+from support.runs import Stop, in_sittings, same_numbers
 
 import sweep
 from sweep.engine import executor, life
@@ -63,18 +63,13 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 @pytest.mark.usefixtures("short_chunks")
 def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.Dataset, counted: list[float]) -> None:
-    out, interruptions = tmp_path / "out", 0
+    out = tmp_path / "out"
     sweep.run(write())
     needed = sum(counted)
     counted.clear()
-    while True:
-        try:
-            dataset = sweep.run(write(), out, reporter=Stop(5))
-            break
-        except KeyboardInterrupt:
-            interruptions += 1
-            assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
+    dataset, interruptions, last = in_sittings(5, write(), out)
     assert interruptions > 2
+    assert last.notes[0].startswith("resuming an earlier run: ")
     assert sum(counted) == needed
     same_numbers(dataset, small)
     assert {path.name for path in out.iterdir()} == {"small.nc", "small.png"}
