@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import netCDF4
 import pytest
@@ -12,7 +13,7 @@ import xarray as xr
 from rich.console import Console
 from support import Write
 from support.cli import invoke, refused
-from support.runs import interrupt, same_numbers
+from support.runs import same_numbers
 
 import sweep
 from sweep.jit import Cached, compiling
@@ -66,11 +67,8 @@ DRY_RUNS = {
 def test_a_dry_run_compiles_computes_and_writes_nothing(
     command: str, words: list[str], write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise AssertionError("compiled or computed")
-
     for name in ("jit.Cached.__call__", "jit.Cached.compile", "kernels.build._start", "kernels.kernel.Kernel.advance"):
-        monkeypatch.setattr(f"sweep.{name}", fail)
+        monkeypatch.setattr(f"sweep.{name}", Mock(side_effect=AssertionError("compiled or computed")))
     verb, *options = command.split()
     result = invoke(verb, write(), *options, "--output", tmp_path / "out", "--dry-run")
     assert result.exit_code == 0, result.output
@@ -92,7 +90,7 @@ RESUMED = "interrupted: no cells finished and kept; the same command without --f
 def test_an_interrupt_is_one_line(
     command: str, during: str, said: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(during, lambda *_, **__: interrupt())
+    monkeypatch.setattr(during, Mock(side_effect=KeyboardInterrupt))
     result = invoke(*command.split(), write(), "--output", tmp_path)
     assert (result.exit_code, result.stderr) == (130, said)
 

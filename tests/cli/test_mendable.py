@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import xarray as xr
@@ -26,13 +27,6 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "quick.nc"
 
 
-def raising(error: Exception) -> Callable[..., None]:
-    def fail(*_: object, **__: object) -> None:
-        raise error
-
-    return fail
-
-
 OURS = [
     KeyError("trajectory"),
     ValueError("min() arg is an empty sequence"),
@@ -45,7 +39,7 @@ OURS = [
 @pytest.mark.parametrize("error", OURS, ids=repr)
 def test_an_error_of_ours_shows_its_traceback(error: Exception, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for verb, target in (("info", "sweep.results.summary.describe"), ("plot", "sweep.plots.picture.plot")):
-        monkeypatch.setattr(target, raising(error))
+        monkeypatch.setattr(target, Mock(side_effect=error))
         with pytest.raises(type(error)):
             invoke(verb, file)
 
@@ -60,7 +54,7 @@ def test_an_error_of_ours_shows_its_traceback(error: Exception, file: Path, monk
 def test_an_error_of_the_system_that_the_user_can_mend_is_a_line(
     error: OSError, said: str, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sweep.results.summary.describe", raising(error))
+    monkeypatch.setattr("sweep.results.summary.describe", Mock(side_effect=error))
     refused(invoke("info", file), said)
 
 
@@ -98,7 +92,7 @@ VERBS = ["run", "trajectory", "critical", "boundaries --x n0 --y mu --set n0=[0.
 def _no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing may be compiled or computed."""
     for name in ("sweep.engine.plan.build", "sweep.kernels.kernel.Kernel.advance", "sweep.reproduce.reproduce"):
-        monkeypatch.setattr(name, raising(AssertionError("computed")))
+        monkeypatch.setattr(name, Mock(side_effect=AssertionError("computed")))
 
 
 @pytest.mark.usefixtures("_no_work")
@@ -115,7 +109,7 @@ def test_a_disk_that_cannot_be_written_is_refused_at_once(
     verb: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     error = OSError(errno.EROFS, "Read-only file system", "/hidden/.tmp")
-    monkeypatch.setattr("sweep.results.writing.TemporaryFile", raising(error))
+    monkeypatch.setattr("sweep.results.writing.TemporaryFile", Mock(side_effect=error))
     config = [] if verb == "reproduce" else [write(TEXT)]
     output = tmp_path / ("out.gif" if verb == "animate" else "out")
     result = invoke(*verb.split(), *config, "--output", output)
@@ -134,7 +128,7 @@ def test_a_file_that_cannot_be_written_is_named_and_not_its_temporary_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     error = OSError(errno.EROFS, "Read-only file system", "hidden")
-    monkeypatch.setattr(Path, "unlink", raising(error))
+    monkeypatch.setattr(Path, "unlink", Mock(side_effect=error))
     with pytest.raises(sweep.StoreError) as refusal, replacing(tmp_path / "x.png"):
         raise error
     assert str(refusal.value) == f"{tmp_path / 'x.png'}: cannot be written: Read-only file system"
@@ -153,10 +147,7 @@ def test_a_missing_file_that_has_the_name_of_an_example_says_how_to_get_it(tmp_p
 
 
 CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
-    "one of them": (
-        lambda d: d.isel(trajectory=0),
-        "lacks the axis trajectory of status and 2 other things; it was",
-    ),
+    "one of them": (lambda d: d.isel(trajectory=0), "lacks the axis trajectory of status and 2 other things; it was"),
     "no spin": (lambda d: d.drop_vars("spin"), "lacks the variable spin; it was cut or averaged"),
     "averaged": (lambda d: d.mean("time", keep_attrs=True), "lacks the variable time and 1 other thing; it was cut"),
     "of nothing": (lambda d: d.isel(trajectory=slice(0)), "the axis trajectory has no values; select at least one"),

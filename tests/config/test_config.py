@@ -23,14 +23,6 @@ def test_axes_are_mu_b_n0_then_as_written(write: Write) -> None:
     assert list(load_config(write(text)).axes) == ["mu", "b", "n0", "a", "delta", "x0"]
 
 
-def test_ranges(write: Write) -> None:
-    config = load_config(
-        write(), {"mu": {"start": 1, "stop": 100, "num": 3, "spacing": "log"}, "b": {"start": 2, "stop": 3, "num": 3}}
-    )
-    np.testing.assert_allclose(config.parameters["mu"].numbers, [1, 10, 100])
-    assert config.parameters["b"].numbers == (2.0, 2.5, 3.0)
-
-
 def test_yaml_numbers_mean_what_they_look_like(write: Write) -> None:
     config = load_config(write(SMALL.replace("[40, 60]", "[1e1, 2.5E1, +3., 012]").replace("x0: 0.01", "x0: -1e-3")))
     assert config.parameters["mu"].numbers == (10.0, 25.0, 3.0, 12.0)
@@ -195,13 +187,6 @@ BEYOND = {
 def test_the_paper_s_model_runs_what_it_knows(beyond: str, read: Read) -> None:
     text = beyond if "friction" in beyond else f"{beyond}\nfriction: {{mu: 60}}"
     assert read(text).tier.name == BEYOND[beyond]
-
-
-def test_angles_in_degrees_anywhere(read: Read) -> None:
-    config = read(stone(("0.5 deg, pitch: 0.5 deg", "[0.5 deg, 0.02], pitch: {start: 0, stop: 1 deg, num: 3}")))
-    assert config.axes["roll"] == (pytest.approx(np.pi / 360), 0.02)
-    assert config.axes["pitch"] == pytest.approx((0, np.pi / 360, np.pi / 180))
-    assert load_config(config, {"roll": "2 deg"}).parameters["roll"].numbers == (pytest.approx(np.pi / 90),)
 
 
 def test_the_default_time_of_bodies_in_si(read: Read) -> None:
