@@ -85,11 +85,16 @@ def test_shipped_configurations_end_decided(name: str) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("name", ["b", "mu", "quick"])
-def test_all_cells_have_settled_in_the_end_and_no_decided_count_contradicts_the_spin(name: str) -> None:
-    """Even those of nearly round bodies."""
+@pytest.mark.parametrize("name", ["b", "quick"])
+def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", estimate_errors=False)
     assert (found.status == SETTLED).all()
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", ["b", "mu", "quick"])
+def test_no_decided_count_contradicts_the_spin(name: str) -> None:
+    found = sweep.run(ROOT / "configs" / f"{name}.yaml", measure=["reversals", "margin"])
     odd = np.sign(found.n0) * np.sign(found.spin_final) != (-1.0) ** found.reversals
     assert not (odd & (found.decided == 1)).any()
     assert (found.decided == 1).sum() > 20

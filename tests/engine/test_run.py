@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from support import Write, columns
 from support.kernels import images, kernel, threads
-from support.runs import Stop, in_sittings, same_numbers
+from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep.config import load_config
@@ -56,18 +56,6 @@ def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.
     assert sum(counted) == needed
     same_numbers(dataset, small)
     assert {path.name for path in out.iterdir()} == {"small.nc", "small.png"}
-
-
-@pytest.mark.parametrize("size", [1, 5])
-def test_tiles_do_not_touch_the_numbers(
-    write: Write, tmp_path: Path, small: xr.Dataset, size: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr("sweep.engine.local.BATCH", 2)
-    same_numbers(sweep.run(write()), small)
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run(write(), tmp_path / "out", reporter=Stop(3))
-    same_numbers(sweep.run(write(), tmp_path / "out"), small)
 
 
 def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
