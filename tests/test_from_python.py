@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from ruamel.yaml import YAML
 from support import Write
 from support.runs import same_numbers
 
@@ -22,10 +23,7 @@ from sweep.config import ConfigError, load_config
 from sweep.plots.fine import critical_spins
 
 TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
-SAID = {
-    "name": "quick", "model": "averaged", "body": {"b": [2, 3]}, "friction": {"mu": [40, 60]},
-    "integrator": {"t_end": 40},
-}  # fmt: skip
+SAID: dict[str, Any] = YAML(typ="safe").load(TEXT)
 """What `TEXT` says."""
 
 AXES = {

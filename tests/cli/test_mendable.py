@@ -152,16 +152,7 @@ CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "averaged": (lambda d: d.mean("time", keep_attrs=True), "lacks the variable time and 1 other thing; it was cut"),
     "of nothing": (lambda d: d.isel(trajectory=slice(0)), "the axis trajectory has no values; select at least one"),
 }
-
-
-@pytest.mark.parametrize("cut", CUTS)
-def test_a_dataset_that_was_cut_says_what_it_lacks(cut: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    change, said = CUTS[cut]
-    found = change(sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20))
-    monkeypatch.setattr("sweep.results.kind.open_dataset", lambda *_, **__: found)  # netCDF does not store all of them
-    for verb in ("info", "plot"):
-        refused(invoke(verb, tmp_path / "cut.nc"), f"cut.nc: {said}")
-
+"""What may be done to a dataset of trajectories."""
 
 FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "title": (lambda d: d.assign_attrs(title=[1, 2]), "the attribute title is not text; another program"),
@@ -170,15 +161,19 @@ FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "words": (lambda d: d.assign(step=d.step.astype(str)), "the variable step holds no numbers; another program"),
     "shape": (lambda d: d.assign(step=d.step.isel(mu=0)), "the variable step is not over the axes of status; another"),
 }
+"""Known names for other things, in a dataset of a run."""
 
 
-@pytest.mark.parametrize("change", FOREIGN)
-def test_a_dataset_with_known_names_for_other_things_is_refused(change: str, tmp_path: Path) -> None:
-    changed, said = FOREIGN[change]
-    found = sweep.run({"friction": {"mu": [50, 60]}}, t_end=20, method="dopri5", estimate_errors=False)
-    changed(found).to_netcdf(tmp_path / "foreign.nc")
+@pytest.mark.parametrize("change", [*CUTS, *FOREIGN])
+def test_a_changed_dataset_says_what_it_lacks_or_what_is_foreign(
+    change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changed, said = (CUTS | FOREIGN)[change]
+    function = sweep.trajectory if change in CUTS else sweep.run
+    found = changed(function({"model": "averaged", "friction": {"mu": [50, 60]}}, t_end=20))
+    monkeypatch.setattr("sweep.results.kind.open_dataset", lambda *_, **__: found)  # netCDF does not store all of them
     for verb in ("info", "plot"):
-        refused(invoke(verb, tmp_path / "foreign.nc"), f"foreign.nc: {said}")
+        refused(invoke(verb, tmp_path / "changed.nc"), f"changed.nc: {said}")
 
 
 def test_a_cluster_without_distributed_says_what_to_install(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

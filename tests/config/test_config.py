@@ -1,7 +1,6 @@
 """What a configuration says, how it is read, and which model runs it."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,9 +47,6 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
         assert load_config(write(), other).fingerprint() != first
 
 
-CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
-
-
 @pytest.mark.parametrize("table", [dict, pandas.DataFrame])
 def test_cases_given_by_columns(table: Callable[..., Any]) -> None:
     columns = {"mu": np.array([60.0, 130.0]), "n0": [0.05, -0.02]}
@@ -77,15 +73,6 @@ def test_wrong_columns_of_cases_are_refused(columns: dict[str, Any], said: str) 
         load_config({"cases": columns})
     assert said in str(refusal.value)
     assert len(refusal.value.faults) == 1
-
-
-def test_cases(write: Write, tmp_path: Path) -> None:
-    (tmp_path / "cells.csv").write_text("mu, b,n0\n60,3,0.05\n1e2,2.5,-0.02\n\n", encoding="utf-8")
-    config = load_config(write(CASES))
-    grid = config.grid
-    assert (grid.dims, grid.shape) == (("case",), (2,))
-    columns = grid.columns()
-    assert (list(columns["mu"]), list(columns["n0"]), list(columns["a"])) == ([60, 100], [0.05, -0.02], [10, 10])
 
 
 @given(

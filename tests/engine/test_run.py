@@ -24,7 +24,7 @@ from sweep.models import MODELS
 
 def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     rows = [(40, 2, 0.05), (60, 5, 0.02)]
-    text = "mu,b,n0\n" + "\n".join(",".join(map(str, row)) for row in rows)
+    text = "mu, b,n0\n" + "".join(f"{mu:.0e},{b},{n0}\n" for mu, b, n0 in rows) + "\n"
     (tmp_path / "cells.csv").write_text(text, encoding="utf-8")
     dataset = sweep.run(
         write("cases: cells.csv\nintegrator: {method: dopri5, t_end: 1500}\n", "table.yaml"), tmp_path / "out"

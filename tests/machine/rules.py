@@ -263,11 +263,8 @@ class Machine(RuleBasedStateMachine):
         keys = (self.config.table[name].path for name in columns)
         document = self.scene.with_({"cases": columns} | more, *keys, "samples", "cases", "picture", "refine")
         for method, _, specs in [("", "", ()), *sorted(self.pool)]:  # its own if it can be
-            own = (
-                {"measure": draws.written(specs), "integrator": document["integrator"] | {"method": method}}
-                if method
-                else {}
-            )
+            integrator = document.get("integrator", {}) | {"method": method}
+            own = {"measure": draws.written(specs), "integrator": integrator} if method else {}
             if self._allowed(document | own):
                 again = self._run(document | own)
                 ran = oracles.simulated(self.found)
