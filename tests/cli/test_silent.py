@@ -96,14 +96,6 @@ def test_a_width_that_no_search_reaches_is_refused(name: str, value: float) -> N
         sweep.boundaries(GRID, **{name: value})  # type: ignore[arg-type]
 
 
-def test_cells_are_run_again_only_of_a_run_that_is_there(write: Write) -> None:
-    with pytest.raises(sweep.StoreError, match=r"^rerun: it needs output, the folder of the run"):
-        sweep.run(write(TEXT), rerun="failed")
-    said = r"^--rerun: single cells of a refined run cannot be simulated again; start anew with --fresh"
-    with pytest.raises(sweep.StoreError, match=said):
-        sweep.run(write(TEXT), "out", rerun="failed", refine=1, tolerance=1e-9)
-
-
 def summary(**variables: Any) -> str:
     from sweep.results.summary import accuracy, describe
 

@@ -241,7 +241,11 @@ def test_rerun_of_no_cells_leaves_a_dataset_that_can_grow(write: Write, tmp_path
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == {"small.nc": before}
 
 
-def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
+def test_rerun_needs_a_dataset_that_was_not_refined(write: Write, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"^rerun: it needs output, the folder of the run"):
+        sweep.run(write(ONE), rerun="failed")
+    with pytest.raises(StoreError, match=r"^--rerun: single cells of a refined run cannot .*; start anew with --fresh"):
+        grown(write, tmp_path / "out", ONE, rerun="failed", refine=1, tolerance=1e-9)
     with pytest.raises(StoreError, match="--rerun needs the dataset"):
         grown(write, tmp_path / "out", ONE, rerun="limit")
     with pytest.raises(ValueError, match="rerun must be failed or limit, not 'all'"):
