@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import distributed
 import numba
+import numpy as np
 import pytest
 import xarray as xr
 from hypothesis import settings
@@ -22,6 +23,7 @@ from support.kernels import SHARED, kernel
 import sweep
 from sweep.jit import showing
 from sweep.kernels.build import build
+from sweep.kernels.kernel import Kernel
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -92,6 +94,21 @@ def browser() -> Iterator[Browser]:
         )  # fmt: skip
         yield found
         found.close()
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Steps that kernels take from now on, one number for each call."""
+    steps, plain = list[float](), Kernel.advance
+
+    def advance(kernel: Kernel, images: np.ndarray, *rest: Any) -> int:
+        before = kernel.table(images)["done"].sum()
+        blocks = plain(kernel, images, *rest)
+        steps.append(kernel.table(images)["done"].sum() - before)
+        return blocks
+
+    monkeypatch.setattr(Kernel, "advance", advance)
+    return steps
 
 
 @pytest.fixture

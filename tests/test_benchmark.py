@@ -3,14 +3,13 @@
 `scripts/benchmark_references.py` made the tables.
 """
 
-import csv
 import re
 import runpy
 from pathlib import Path
 from subprocess import CompletedProcess
-from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 from support import ROOT
 from support.processes import python
@@ -18,16 +17,14 @@ from support.processes import python
 FOLDER = ROOT / "data" / "benchmark"
 
 
-def _rows(name: str) -> list[dict[str, str]]:
-    with (FOLDER / name).open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
+CASES, REFERENCES, REVERSALS = (
+    pandas.read_csv(FOLDER / f"{name}.csv", dtype={"times": str}) for name in ("cases", "references", "reversals")
+)
 
 
-def _references() -> dict[str, dict[float, float]]:
-    spins: dict[str, dict[float, float]] = {}
-    for row in _rows("references.csv"):
-        spins.setdefault(row["case"], {})[float(row["t"])] = float(row["spin"])
-    return spins
+def _spins(case: str) -> pandas.Series:
+    """The reference spins of a case, by time."""
+    return REFERENCES[REFERENCES["case"] == case].set_index("t")["spin"]
 
 
 def _score(folder: Path, lines: list[str], code: int = 0) -> CompletedProcess[str]:
@@ -38,44 +35,33 @@ def _score(folder: Path, lines: list[str], code: int = 0) -> CompletedProcess[st
 
 
 def test_every_case_has_its_references() -> None:
-    cases, spins = _rows("cases.csv"), _references()
-    assert [row["case"] for row in cases] == list(spins)
-    for row in cases:
-        assert [float(t) for t in row["times"].split()] == list(spins[row["case"]])
-    assert all(0 < float(row["error_bound"]) <= 1e-11 for row in _rows("references.csv"))
+    assert list(CASES["case"]) == list(REFERENCES["case"].unique())
+    for case, times in zip(CASES["case"], CASES["times"], strict=True):
+        assert [float(t) for t in times.split()] == list(_spins(case).index)
+    assert REFERENCES["error_bound"].between(0, 1e-11, inclusive="right").all()
     said = re.search(r"`cases.csv` \| (\d+) cases", (FOLDER / "README.md").read_text(encoding="utf-8"))
     assert said
-    assert int(said[1]) == len(cases)
+    assert int(said[1]) == len(CASES)
 
 
 def test_reversals_come_before_the_end_and_as_kane_and_levinson_found() -> None:
-    reversals = {row["case"]: row for row in _rows("reversals.csv")}
-    for row in reversals.values():
-        times = [float(t) for t in row["times"].split()]
-        assert len(times) == int(row["reversals"])
-        assert all(0 < t < float(row["until"]) for t in times)
-    zeros = {
-        name: reversals[f"kane_levinson_{name}"]["times"] for name in ("left", "right", "left_damped", "right_damped")
-    }
-    assert [round(float(zeros[name]), 3) for name in ("left", "left_damped")] == [2.855, 2.556]
-    assert round(float(zeros["right"]), 2) == 11.53
-    assert zeros["right_damped"] == ""
+    rows = REVERSALS.fillna({"times": ""})
+    times = {row.case: [float(t) for t in row.times.split()] for row in rows.itertuples()}
+    for row in rows.itertuples():
+        assert len(times[row.case]) == row.reversals
+        assert all(0 < t < row.until for t in times[row.case])
+    zeros = [times[f"kane_levinson_{name}"] for name in ("left", "left_damped", "right", "right_damped")]
+    assert [[round(t, 3) for t in each] for each in zeros[:2]] == [[2.855], [2.556]]
+    assert [round(t, 2) for t in zeros[2]] == [11.53]
+    assert zeros[3] == []
 
 
 def test_references_agree_with_those_of_128_bits() -> None:
-    def key(row: Any) -> tuple[float, ...]:
-        return tuple(float(row[name]) for name in ("a", "b", "delta", "mu", "n0", "x0", "y0"))
-
-    path = ROOT / "sweep" / "bench" / "data" / "reference_spins.csv"
-    table = np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8")
-    others = {(key(row), float(row["t"])): float(row["spin"]) for row in table[table["model"] == "slip"]}
-    spins, compared = _references(), 0
-    for case in (row for row in _rows("cases.csv") if row["model"] == "slip"):
-        for t, spin in spins[case["case"]].items():
-            if (key(case), t) in others:
-                compared += 1
-                assert spin == pytest.approx(others[key(case), t], abs=1e-13)
-    assert compared > 40
+    others = pandas.read_csv(ROOT / "sweep" / "bench" / "data" / "reference_spins.csv")
+    same = ["model", "a", "b", "delta", "mu", "n0", "x0", "y0", "t"]
+    both = CASES[CASES["model"] == "slip"].merge(REFERENCES, on="case").merge(others, on=same)
+    assert len(both) > 40
+    np.testing.assert_allclose(both["spin_x"], both["spin_y"], rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -85,15 +71,13 @@ def test_the_example_agrees_with_the_references(case: str, end: float, error: fl
     example = runpy.run_path(str(FOLDER / "example_scipy.py"))
     chosen = example["read_cases"]()[case]
     chosen["times"] = [t for t in chosen["times"] if t <= end]
-    np.testing.assert_allclose(
-        example["solve"](chosen), [_references()[case][t] for t in chosen["times"]], rtol=0, atol=error
-    )
+    np.testing.assert_allclose(example["solve"](chosen), [_spins(case)[t] for t in chosen["times"]], rtol=0, atol=error)
 
 
 def test_the_scorer_finds_a_planted_error(tmp_path: Path) -> None:
     lines = ["case,t,spin,seconds,reversals"]
     for case in ("mu60_b3", "wide43"):
-        lines += [f"{case},{t:g},{spin!r},0.5,1" for t, spin in _references()[case].items()]
+        lines += [f"{case},{t:g},{spin!r},0.5,1" for t, spin in _spins(case).items()]
     found = _score(tmp_path, lines)
     assert "within 1e-10: 2 of 2 cases" in found.stdout
     case, t, spin, *rest = lines[2].split(",")

@@ -1,6 +1,5 @@
 """The package as a user installs it: a wheel in a fresh environment, every verb run from another folder."""
 
-import fcntl
 import os
 import re
 import shutil
@@ -44,43 +43,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The interpreter of a fresh environment that has the wheel and what it depends on, and nothing else.
-
-    Processes that share the tests share it, with the kernels that it compiles: one makes it, and the others wait.
-    """
-    own = tmp_path_factory.getbasetemp()
-    environment = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "environment"
-    made = environment / "made"
-    with environment.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        interpreter = environment / "bin" / "python"
-        if not made.exists():
-            subprocess.run([sys.executable, "-m", "venv", environment], check=True)
-            subprocess.run([interpreter, "-m", "pip", "install", "-q", wheel], check=True, env=ENVIRONMENT)
-            made.touch()
-    return interpreter
-
-
-@pytest.fixture(scope="module")
-def folder(python: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a configuration and the results of one run."""
-    folder = tmp_path_factory.mktemp("elsewhere")
-    (folder / "small.yaml").write_text(CONFIG, encoding="utf-8")
-    sweep(python, folder, "run", "small.yaml")
-    return folder
-
-
 def call(folder: Path, *command: str | Path) -> str:
     """The standard output of a command run in `folder`, which has to succeed."""
     done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-def sweep(python: Path, folder: Path, *arguments: str) -> str:
-    return call(folder, python, "-m", "sweep", *arguments)
 
 
 def test_wheel_holds_every_file_of_the_package_and_the_configurations(wheel: Path) -> None:
@@ -91,7 +58,7 @@ def test_wheel_holds_every_file_of_the_package_and_the_configurations(wheel: Pat
 
 
 VERBS = {
-    "run small.yaml --output again": ["again/small.nc", "again/small.png"],
+    "run small.yaml": ["runs/small/small.nc", "runs/small/small.png"],
     "run small.yaml --dry-run": [],
     "trajectory small.yaml --at mu=60 --at b=3": [
         "runs/small/small_trajectory.nc", "runs/small/small_trajectory.png",
@@ -105,16 +72,6 @@ VERBS = {
     "bench --help": [],
 }  # fmt: skip
 """Commands, and the files they must write."""
-
-
-@pytest.mark.parametrize("command", VERBS)
-def test_every_verb_runs_from_another_folder(command: str, python: Path, folder: Path) -> None:
-    sweep(python, folder, *command.split())
-    assert [name for name in VERBS[command] if not (folder / name).is_file()] == []
-
-
-def test_console_script(python: Path, folder: Path) -> None:
-    assert call(folder, python.parent / "sweep", "--version").startswith("sweep, version ")
 
 
 def test_the_folder_above_an_editable_install_hides_nothing(tmp_path: Path) -> None:
@@ -147,9 +104,18 @@ TYPES = [
 ]
 
 
-def test_type_hints_arrive(python: Path, folder: Path) -> None:
-    (folder / "user.py").write_text(USER, encoding="utf-8")
-    command = [sys.executable, "-m", "mypy", "--strict", "--python-executable", python, "user.py"]
-    done = subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+def test_in_a_fresh_environment_every_verb_runs_and_type_hints_arrive(wheel: Path, tmp_path: Path) -> None:
+    """With the wheel and what it depends on, and nothing else."""
+    python = tmp_path / "environment" / "bin" / "python"
+    call(tmp_path, sys.executable, "-m", "venv", "environment")
+    call(tmp_path, python, "-m", "pip", "install", "-q", wheel)
+    (tmp_path / "small.yaml").write_text(CONFIG, encoding="utf-8")
+    for command, files in VERBS.items():
+        call(tmp_path, python, "-m", "sweep", *command.split())
+        assert [name for name in files if not (tmp_path / name).is_file()] == [], command
+    assert call(tmp_path, python.parent / "sweep", "--version").startswith("sweep, version ")
+    (tmp_path / "user.py").write_text(USER, encoding="utf-8")
+    checked = [sys.executable, "-m", "mypy", "--strict", "--python-executable", python, "user.py"]
+    done = subprocess.run(checked, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     said = [line for line in done.stdout.splitlines() if line.startswith("user.py:")]
     assert [words in line for words, line in zip(TYPES, said, strict=True)] == [True] * len(TYPES), done.stdout

@@ -13,7 +13,6 @@ from sweep.models import MODELS
 from sweep.models.ladder import analytic
 from sweep.models.theory import coefficients
 from sweep.report import rows
-from sweep.report.direct import Ends
 from sweep.report.rows import Section
 from sweep.reproduce import report, simulations, theory
 from sweep.reproduce.rows import against_paper, published
@@ -24,22 +23,6 @@ GROUPS: dict[str, Callable[[], Iterable[Any]]] = {
     "effective": theory._reduced_rows,
     "averaged": theory._reduced_rows,
 }
-
-
-SIMULATE, DONE = theory.simulate, dict[Any, Ends]()
-
-
-def simulate_once(columns: Any, t_end: float, model: str = "slip", step: float | None = None) -> Ends:
-    """As `theory.simulate`: what a wrong coefficient of another model does not change is remembered."""
-    key = MODELS[model].constants, str(columns), t_end, step
-    if key not in DONE:
-        DONE[key] = SIMULATE(columns, t_end, model=model, step=step)
-    return DONE[key]
-
-
-@pytest.fixture(autouse=True)
-def _remembering(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(theory, "simulate", simulate_once)
 
 
 def failures(group: Callable[[], Iterable[Any]]) -> list[str]:

@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from unittest.mock import Mock
 
 import netCDF4
 import pytest
@@ -22,7 +22,7 @@ from sweep.progress import Terminal
 
 def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     result = invoke("run", write(), "--output", tmp_path / "out")
-    assert result.exit_code == 0
+    assert (result.exit_code, "resuming" in result.stderr) == (0, False)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"small.nc", "small.png"}
     told = invoke("info", tmp_path / "out" / "small.nc").stdout
     assert "12 cells (mu 2 × b 3 × n0 2)" in result.stdout
@@ -67,11 +67,8 @@ DRY_RUNS = {
 def test_a_dry_run_compiles_computes_and_writes_nothing(
     command: str, words: list[str], write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(*_: object, **__: object) -> None:
-        raise AssertionError("compiled or computed")
-
     for name in ("jit.Cached.__call__", "jit.Cached.compile", "kernels.build._start", "kernels.kernel.Kernel.advance"):
-        monkeypatch.setattr(f"sweep.{name}", fail)
+        monkeypatch.setattr(f"sweep.{name}", Mock(side_effect=AssertionError("compiled or computed")))
     verb, *options = command.split()
     result = invoke(verb, write(), *options, "--output", tmp_path / "out", "--dry-run")
     assert result.exit_code == 0, result.output
@@ -80,15 +77,22 @@ def test_a_dry_run_compiles_computes_and_writes_nothing(
     assert not (tmp_path / "out").exists()
 
 
-def test_the_command_that_resumes_is_told(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: Any) -> None:
-        raise KeyboardInterrupt
+RESUMED = "interrupted: no cells finished and kept; the same command without --fresh resumes the run\n"
 
-    monkeypatch.setattr("sweep.results.folder.RunFiles.locked", interrupt)
-    result = invoke("run", write(), "--output", tmp_path, "--fresh")
-    assert result.exit_code == 130
-    said = "interrupted: no cells finished and kept; the same command without --fresh resumes the run\n"
-    assert result.stderr == said
+
+@pytest.mark.parametrize(
+    ("command", "during", "said"),
+    [
+        ("run --fresh", "sweep.results.folder.RunFiles.locked", RESUMED),
+        ("critical", "sweep.config.load_config", "interrupted\n"),
+    ],
+)
+def test_an_interrupt_is_one_line(
+    command: str, during: str, said: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(during, Mock(side_effect=KeyboardInterrupt))
+    result = invoke(*command.split(), write(), "--output", tmp_path)
+    assert (result.exit_code, result.stderr) == (130, said)
 
 
 def test_too_many_failures(write: Write, tmp_path: Path) -> None:
@@ -97,9 +101,8 @@ def test_too_many_failures(write: Write, tmp_path: Path) -> None:
     assert result.exit_code == 3
     assert "50.00% of the cells failed; max_failed_fraction allows 1.00%" in result.stderr
     assert (tmp_path / "out" / "small.nc").exists()
-    assert (
-        invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5").exit_code == 0
-    )
+    allowed = invoke("run", write(), "--output", tmp_path / "b", *settings, "--set", "max_failed_fraction=0.5")
+    assert allowed.exit_code == 0
 
 
 @pytest.fixture

@@ -2,15 +2,16 @@
 
 import errno
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import xarray as xr
 from support import ROOT, Write
 from support.cli import invoke, refused
+from support.processes import python
 
 import sweep
 from sweep.cli import environment
@@ -26,13 +27,6 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "quick.nc"
 
 
-def raising(error: Exception) -> Callable[..., None]:
-    def fail(*_: object, **__: object) -> None:
-        raise error
-
-    return fail
-
-
 OURS = [
     KeyError("trajectory"),
     ValueError("min() arg is an empty sequence"),
@@ -45,7 +39,7 @@ OURS = [
 @pytest.mark.parametrize("error", OURS, ids=repr)
 def test_an_error_of_ours_shows_its_traceback(error: Exception, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for verb, target in (("info", "sweep.results.summary.describe"), ("plot", "sweep.plots.picture.plot")):
-        monkeypatch.setattr(target, raising(error))
+        monkeypatch.setattr(target, Mock(side_effect=error))
         with pytest.raises(type(error)):
             invoke(verb, file)
 
@@ -60,7 +54,7 @@ def test_an_error_of_ours_shows_its_traceback(error: Exception, file: Path, monk
 def test_an_error_of_the_system_that_the_user_can_mend_is_a_line(
     error: OSError, said: str, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sweep.results.summary.describe", raising(error))
+    monkeypatch.setattr("sweep.results.summary.describe", Mock(side_effect=error))
     refused(invoke("info", file), said)
 
 
@@ -88,10 +82,7 @@ def test_a_threading_layer_whose_library_is_missing_is_a_line(monkeypatch: pytes
 
 def test_a_backend_that_is_not_installed_is_not_asked_for(file: Path) -> None:
     """Matplotlib takes it from the environment when it is imported, and a notebook sets one that only it has."""
-    command = [sys.executable, "-m", "sweep", "plot", str(file)]
-    environment = {**os.environ, "MPLBACKEND": "nobody_has_it"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert python("-m", "sweep", "plot", file, MPLBACKEND="nobody_has_it").stderr == ""
 
 
 VERBS = ["run", "trajectory", "critical", "boundaries --x n0 --y mu --set n0=[0.02,0.05]"]
@@ -101,7 +92,7 @@ VERBS = ["run", "trajectory", "critical", "boundaries --x n0 --y mu --set n0=[0.
 def _no_work(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing may be compiled or computed."""
     for name in ("sweep.engine.plan.build", "sweep.kernels.kernel.Kernel.advance", "sweep.reproduce.reproduce"):
-        monkeypatch.setattr(name, raising(AssertionError("computed")))
+        monkeypatch.setattr(name, Mock(side_effect=AssertionError("computed")))
 
 
 @pytest.mark.usefixtures("_no_work")
@@ -118,7 +109,7 @@ def test_a_disk_that_cannot_be_written_is_refused_at_once(
     verb: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     error = OSError(errno.EROFS, "Read-only file system", "/hidden/.tmp")
-    monkeypatch.setattr("sweep.results.writing.TemporaryFile", raising(error))
+    monkeypatch.setattr("sweep.results.writing.TemporaryFile", Mock(side_effect=error))
     config = [] if verb == "reproduce" else [write(TEXT)]
     output = tmp_path / ("out.gif" if verb == "animate" else "out")
     result = invoke(*verb.split(), *config, "--output", output)
@@ -137,38 +128,31 @@ def test_a_file_that_cannot_be_written_is_named_and_not_its_temporary_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     error = OSError(errno.EROFS, "Read-only file system", "hidden")
-    monkeypatch.setattr(Path, "unlink", raising(error))
+    monkeypatch.setattr(Path, "unlink", Mock(side_effect=error))
     with pytest.raises(sweep.StoreError) as refusal, replacing(tmp_path / "x.png"):
         raise error
     assert str(refusal.value) == f"{tmp_path / 'x.png'}: cannot be written: Read-only file system"
+
+
+def test_a_picture_needs_a_free_name_in_a_folder_that_is_there(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "folder.png").mkdir()
+    for target in ("folder.png", "nowhere/x.png"):
+        refused(invoke("plot", file, "--output", tmp_path / target), "cannot be written: ")
 
 
 def test_a_missing_file_that_has_the_name_of_an_example_says_how_to_get_it(tmp_path: Path) -> None:
     for name in ("quick", "quick.yaml"):
         refused(invoke("run", tmp_path / name), f"{name}: no such file; `sweep examples quick` copies the example of")
     refused(invoke("animate", tmp_path / "quick"), "`sweep examples quick`")
-    refused(invoke("run", tmp_path / "mine.yaml"), "mine.yaml: no such file")
 
 
 CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
-    "one of them": (
-        lambda d: d.isel(trajectory=0),
-        "lacks the axis trajectory of status and 2 other things; it was",
-    ),
+    "one of them": (lambda d: d.isel(trajectory=0), "lacks the axis trajectory of status and 2 other things; it was"),
     "no spin": (lambda d: d.drop_vars("spin"), "lacks the variable spin; it was cut or averaged"),
     "averaged": (lambda d: d.mean("time", keep_attrs=True), "lacks the variable time and 1 other thing; it was cut"),
     "of nothing": (lambda d: d.isel(trajectory=slice(0)), "the axis trajectory has no values; select at least one"),
 }
-
-
-@pytest.mark.parametrize("cut", CUTS)
-def test_a_dataset_that_was_cut_says_what_it_lacks(cut: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    change, said = CUTS[cut]
-    found = change(sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20))
-    monkeypatch.setattr("sweep.results.kind.open_dataset", lambda *_, **__: found)  # netCDF does not store all of them
-    for verb in ("info", "plot"):
-        refused(invoke(verb, tmp_path / "cut.nc"), f"cut.nc: {said}")
-
+"""What may be done to a dataset of trajectories."""
 
 FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "title": (lambda d: d.assign_attrs(title=[1, 2]), "the attribute title is not text; another program"),
@@ -177,15 +161,19 @@ FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "words": (lambda d: d.assign(step=d.step.astype(str)), "the variable step holds no numbers; another program"),
     "shape": (lambda d: d.assign(step=d.step.isel(mu=0)), "the variable step is not over the axes of status; another"),
 }
+"""Known names for other things, in a dataset of a run."""
 
 
-@pytest.mark.parametrize("change", FOREIGN)
-def test_a_dataset_with_known_names_for_other_things_is_refused(change: str, tmp_path: Path) -> None:
-    changed, said = FOREIGN[change]
-    found = sweep.run({"friction": {"mu": [50, 60]}}, t_end=20, method="dopri5", estimate_errors=False)
-    changed(found).to_netcdf(tmp_path / "foreign.nc")
+@pytest.mark.parametrize("change", [*CUTS, *FOREIGN])
+def test_a_changed_dataset_says_what_it_lacks_or_what_is_foreign(
+    change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changed, said = (CUTS | FOREIGN)[change]
+    function = sweep.trajectory if change in CUTS else sweep.run
+    found = changed(function({"model": "averaged", "friction": {"mu": [50, 60]}}, t_end=20))
+    monkeypatch.setattr("sweep.results.kind.open_dataset", lambda *_, **__: found)  # netCDF does not store all of them
     for verb in ("info", "plot"):
-        refused(invoke(verb, tmp_path / "foreign.nc"), f"foreign.nc: {said}")
+        refused(invoke(verb, tmp_path / "changed.nc"), f"changed.nc: {said}")
 
 
 def test_a_cluster_without_distributed_says_what_to_install(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from support import ROOT, SMALL, Write
+from support import SMALL, Write
 from support.processes import python
 
 HEAVY = {"numba", "llvmlite", "xarray", "pandas", "netCDF4", "dask", "distributed", "matplotlib", "scipy"}
@@ -27,12 +27,6 @@ REFUSED = {
 """Commands and configurations."""
 
 _IMPORT = re.compile(r"import time:.*\| +(\S+)")
-
-
-def start(*arguments: str | Path) -> subprocess.Popen[str]:
-    """`python -m sweep ARGUMENTS`, which tells of each module on stderr as soon as it is loaded."""
-    command = [sys.executable, "-X", "importtime", "-m", "sweep", *map(str, arguments)]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 COMPLETED = {
@@ -105,7 +99,8 @@ MOMENTS = "click sweep.cli ruamel.yaml numpy pydantic sweep.config numba xarray 
 
 @pytest.mark.parametrize("moment", MOMENTS.split())
 def test_an_interrupt_during_start_is_one_line(moment: str, write: Write, tmp_path: Path) -> None:
-    with start("run", write(SMALL), "--output", tmp_path / "out") as process:
+    command = [sys.executable, "-X", "importtime", "-m", "sweep", "run", write(SMALL), "--output", tmp_path / "out"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
         told = []
         for line in process.stderr:

@@ -1,7 +1,6 @@
 """What has ended: each name gets a line with what to do instead, and datasets that name it are still of use."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from support import Write
@@ -12,11 +11,6 @@ from sweep.ended import ENDED
 from sweep.results.configuration import configuration
 
 TEXT = "friction: {mu: 60}\nintegrator: {t_end: 5}\n"
-
-
-def nested(name: str) -> dict[str, Any]:
-    section, _, key = name.rpartition(".")
-    return {section: {key: 1}} if section else {key: 1}
 
 
 @pytest.mark.parametrize("name", ENDED)

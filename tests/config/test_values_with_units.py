@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from support import SMALL, Write
-from support.cli import invoke, refused
+from support import Write
+from support.cli import invoke
 from support.physics import STONE, stone
 
 import sweep
-from sweep import ConfigError, load_config
+from sweep import load_config
 from sweep.config.document import parse_value
 
 
@@ -48,68 +48,11 @@ def test_lists_ranges_and_distributions_have_units_too(text: str, write: Write) 
         assert found.distribution.second == {"normal": 0.001, "lognormal": 0.1}[found.distribution.family]
 
 
-def test_a_trajectory_is_asked_for_in_any_unit(write: Write) -> None:
-    found = sweep.trajectory(write(STONE), c=["2 cm", "25 mm"], t_end=0.1)
-    assert found["c"].values == pytest.approx([0.02, 0.025])
-    with pytest.raises(ConfigError, match=r"^b: is in c here; give the number without cm, or set units: SI$"):
-        sweep.trajectory(write(SMALL), b="3 cm")
-
-
 def test_the_command_line_takes_them_too(write: Write, tmp_path: Path) -> None:
     line = ["trajectory", write(STONE), "--set", "t_end=0.1", "--output", tmp_path, "--quiet"]
     assert invoke(*line, "--at", "c=2 cm", "--at", "c=25mm").exit_code == 0
     (file,) = tmp_path.glob("*_trajectory.nc")
     assert sweep.open(file)["c"].values == pytest.approx([0.02, 0.025])
-    refused(
-        invoke("trajectory", write(SMALL), "--dry-run", "--at", "b=3cm"),
-        "--at b: is in c here; give the number without cm",
-    )
-
-
-def small(old: str, new: str) -> str:
-    assert old in SMALL
-    return SMALL.replace(old, new)
-
-
-REFUSED: dict[str, tuple[str, str]] = {
-    "length": (small("10.0", "12 cm"), ":2:8: body.a: is in c here; give the number without cm, or set units: SI"),
-    "spin": (small("[0.02, 0.05]", "[0.02, 3 rpm]"), "start.n0: is in sqrt(g/c) here; give the number without rpm"),
-    "time": (small("1500", "20 s"), "integrator.t_end: is in sqrt(c/g) here; give the number without s"),
-    "pure": (stone(("mu: 0.5", "mu: 0.5 s/m")), "friction.mu: is a pure number here; leave out s/m"),
-    "no unit": (stone(("law: coulomb", "law: stribeck"), ("regularisation: tanh", "mu_static: 0.4 m")), "not '0.4 m'"),
-    "other": (stone(("c: 0.02", "c: 20 g")), "not '20 g'; its unit must be m, cm, mm, in or ft"),
-    "error": (stone(("c: 0.02", "c: 20+-1 mm")), "not '20+-1 mm'; write an error as {normal: [value, error]}"),
-    "thousands": (stone(("c: 0.02", "c: '1,250 mm'")), "not '1,250 mm'; write 1.250 mm or 1250 mm"),
-    "comma": (
-        small("[40, 60]}", "1,5}"),
-        ":3:16: friction.mu: a comma ends a value in braces; write 1.5 for one",
-    ),
-    "comma and unit": (stone(("c: 0.02", "c: 2,5cm")), "body.c: a comma ends a value in braces; write 2.5cm for one"),
-    "comma in a list": (stone(("c: 0.02", "c: [2,5cm, 3cm]")), "body.c: a comma ends an item of a list; write 2.5cm"),
-    "comma alone": (small("friction: {mu: [40, 60]}", "friction:\n  mu: 1,5"), "not '1,5'; write 1.5 or [1, 5]"),
-    "quotes": (small("[40, 60]", "'60'"), "not '60'; leave out the quotes"),
-    **{
-        span: (small("[40, 60]", f"'{span}'"), f"not '{span}'; a range is written {{start: 20, stop: 60, num: 41}}")
-        for span in ("20..60", "20:60", "20 to 60", "20…60", "20..60:41", "20:60:41")
-    },
-    "span": (
-        stone(("c: 0.02", "c: 20cm..30 cm")),
-        "; a range is written {start: 20cm, stop: 30 cm, num: 41}, with the number",
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", REFUSED)
-def test_a_refusal_says_what_to_write(kind: str, write: Write) -> None:
-    text, said = REFUSED[kind]
-    refused(invoke("run", write(text), "--dry-run"), said)
-
-
-@pytest.mark.parametrize("value", ["20..60", "20:200", "1,5"])
-def test_a_refusal_of_a_setting_does_so_too(value: str, write: Write) -> None:
-    low, high = (each for each in ("20", "60" if "60" in value else "200"))
-    form = "write 1.5 or [1, 5]" if "," in value else f"{{start: {low}, stop: {high}, num: 41}}"
-    refused(invoke("run", write(SMALL), "--set", f"mu={value}"), form)
 
 
 @pytest.mark.parametrize(
@@ -126,18 +69,3 @@ def test_tables_of_cases_have_units_and_any_separator(table: str, write: Write, 
     config = load_config(write(text + "cases: cells.csv\n"))
     assert config.cases == {"a": pytest.approx((0.2, 0.1)), "omega3": (-5.0, 5.0)}
     assert load_config(config, {"t_end": 4}).cases == config.cases
-
-
-@pytest.mark.parametrize(
-    ("table", "said"),
-    [
-        ("a (kg)\n20\n10\n", "cells.csv:1:1: a: is in 'kg'; its unit must be m, cm, mm, in or ft"),
-        ("a (cm)\n20\n10\n", "cases.a: is in c here; give the number without cm, or set units: SI"),
-        ("a,mu\n1,5,60\n", "cells.csv:2: 3 values, but 2 columns in line 1, with commas between them; use semicolons"),
-        ("a;mu\n15\n", "cells.csv:2: 1 values, but 2 columns in line 1, with semicolons between them"),
-    ],
-)
-def test_a_table_is_refused_where_it_is_wrong(table: str, said: str, write: Write, tmp_path: Path) -> None:
-    (tmp_path / "cells.csv").write_text(table, encoding="utf-8")
-    text = SMALL.replace("a: 10.0, ", "").replace("[40, 60]", "50").replace("[0.02, 0.05]", "0.02")
-    refused(invoke("run", write(text + "cases: cells.csv\n"), "--dry-run"), said)

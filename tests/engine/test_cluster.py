@@ -20,7 +20,7 @@ from support import ROOT, Write
 from support.cli import invoke
 from support.kernels import threads
 from support.processes import python
-from support.runs import Heard, Stop, same_numbers
+from support.runs import Heard, same_numbers
 from support.same import contents
 
 import sweep
@@ -148,25 +148,6 @@ def slow_down() -> None:
 
 
 @pytest.mark.campaign
-def test_a_run_resumed_on_a_cluster_computes_what_is_missing(
-    config: Path,
-    tmp_path: Path,
-    client: distributed.Client,
-    local: distributed.LocalCluster,
-    by_threads: dict[str, bytes],
-) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run(config, tmp_path, reporter=Stop(1), client=client)
-    there = len(list(tmp_path.glob("tiles.checkpoint/0*.npz")))
-    while any(client.processing().values()):
-        time.sleep(0.05)
-    local.scheduler.transition_log.clear()
-    sweep.run(config, tmp_path, client=client)
-    assert completed(local) == TILES - there < TILES
-    assert contents(tmp_path) == by_threads
-
-
-@pytest.mark.campaign
 def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> None:
     # One worker may take all tiles, so each says both.
     types = iter(["one", "another"] * TILES)
@@ -227,7 +208,13 @@ def test_a_scheduler_that_does_not_answer_is_reported(config: Path, tmp_path: Pa
 
 
 @pytest.mark.campaign
-def test_a_lost_scheduler_leaves_finished_tiles(config: Path, tmp_path: Path, by_threads: dict[str, bytes]) -> None:
+def test_a_run_that_lost_its_scheduler_computes_what_is_missing_on_another(
+    config: Path,
+    tmp_path: Path,
+    client: distributed.Client,
+    local: distributed.LocalCluster,
+    by_threads: dict[str, bytes],
+) -> None:
     program = (
         "import time, distributed\n"
         "if __name__ == '__main__':\n"
@@ -259,7 +246,10 @@ def test_a_lost_scheduler_leaves_finished_tiles(config: Path, tmp_path: Path, by
         2,
         "the dask scheduler is gone; finished tiles are kept, and the same command without --fresh resumes the run\n",
     )
-    sweep.run(config, out)
+    there = len(list(out.glob("tiles.checkpoint/0*.npz")))
+    local.scheduler.transition_log.clear()
+    sweep.run(config, out, client=client)
+    assert completed(local) == TILES - there < TILES
     assert contents(out) == by_threads
 
 

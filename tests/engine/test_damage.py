@@ -6,11 +6,9 @@ What would mix other numbers in is refused.  Real processes that are killed are 
 
 import os
 import shutil
-import struct
 from collections.abc import Callable, Iterator
 from importlib import metadata
 from pathlib import Path
-from zipfile import ZipFile, is_zipfile
 
 import numpy as np
 import pytest
@@ -80,26 +78,10 @@ def cut(share: float) -> Callable[[Path], None]:
     return lambda path: os.truncate(path, int(share * path.stat().st_size))
 
 
-def flip(share: float) -> Callable[[Path], None]:
-    def flip_byte(path: Path) -> None:
-        whole = bytearray(path.read_bytes())
-        at = int(share * (len(whole) - 1))
-        whole[_in_an_array(path, at) if 0 < share < 1 and is_zipfile(path) else at] ^= 0xFF
-        path.write_bytes(whole)
-
-    return flip_byte
-
-
-def _in_an_array(path: Path, at: int) -> int:
-    """The first byte from `at` on that belongs to an array: between arrays, some bytes of a ZIP file say nothing."""
-    whole = path.read_bytes()
-    with ZipFile(path) as members:
-        for member in members.infolist():
-            names = sum(struct.unpack_from("<HH", whole, member.header_offset + 26))
-            start = member.header_offset + 30 + names
-            if start + member.compress_size > at:
-                return max(at, start)
-    raise AssertionError(f"{path}: no array after byte {at}")
+def flip(path: Path) -> None:
+    whole = bytearray(path.read_bytes())
+    whole[len(whole) // 2] ^= 0xFF
+    path.write_bytes(whole)
 
 
 def foreign(path: Path) -> None:
@@ -113,16 +95,13 @@ def another_tile(path: Path) -> None:
     shutil.copy(files[(files.index(path) + 1) % len(files)], path)
 
 
-DAMAGES: dict[str, Callable[[Path], None]] = {
-    **{f"cut{i}": cut(i) for i in (0, 0.4, 0.999)},
-    **{f"flip{i}": flip(i) for i in (0, 0.3, 0.7, 1)},
+CUTS = {f"cut{i}": cut(i) for i in (0, 0.4, 0.999)}
+DAMAGES: dict[str, Callable[[Path], None]] = CUTS | {
     "removed": Path.unlink,
     "foreign": foreign,
     "another's": another_tile,
 }
-
-
-QUICK = ("flip0.3", "another's")
+QUICK = ("cut0.4", "another's")
 
 
 @pytest.mark.parametrize(
@@ -135,10 +114,11 @@ def test_damaged_tiles_and_images_are_computed_again(
     assert [path.stem for path in files] == ["000000", "000001", "000002", "running"]
     for path in files:
         DAMAGES[how](path)
+    for name in ("1.npz", "0abc.npz", "notes.txt", "000099.npz", ".x.part", "000099.npz.orig"):  # ignored
+        (out / "small.checkpoint" / name).write_bytes(b"mine")
     result = invoke("run", config, "--output", out)
-    quiet = how in ("removed", "flip1")  # the last byte is the length of a comment
     told = [f"{path.name}: damaged" in result.stderr for path in files]
-    assert (result.exit_code, told) == (0, [not quiet] * 4), result.stderr
+    assert (result.exit_code, told) == (0, [how != "removed"] * 4), result.stderr
     assert contents(out) == undisturbed
 
 
@@ -146,12 +126,10 @@ ODD = (b"null", b"[]", b'"x"', b"{}", b'{"config": 1}', b"[" * 100_000, b"9" * 5
 """Files of JSON, or nearly, that are no identities."""
 
 
-@pytest.mark.parametrize(
-    "how", [*(name for name in DAMAGES if name not in ("removed", "another's")), *ODD], ids=lambda how: str(how)[:20]
-)
-def test_a_damaged_identity_is_refused(config: Path, out: Path, how: str | bytes) -> None:
+@pytest.mark.parametrize("how", [*CUTS.values(), flip, foreign, *ODD], ids=lambda how: str(how)[:20])
+def test_a_damaged_identity_is_refused(config: Path, out: Path, how: Callable[[Path], None] | bytes) -> None:
     file = out / "small.checkpoint" / "identity.json"
-    file.write_bytes(how) if isinstance(how, bytes) else DAMAGES[how](file)
+    file.write_bytes(how) if isinstance(how, bytes) else how(file)
     refused(invoke("run", config, "--output", out, "--quiet"), "identity.json: damaged", "--fresh")
 
 
@@ -169,13 +147,6 @@ def test_tiles_without_an_identity_are_known_by_their_stamp(
     result = invoke("run", config, "--output", out, *settings)
     assert (result.exit_code, "not a file of this run" in result.stderr) == (0, bool(settings)), result.stderr
     assert (contents(out) == undisturbed) == (not settings)
-
-
-def test_foreign_files_in_the_folder_are_ignored(config: Path, out: Path, undisturbed: dict[str, bytes]) -> None:
-    for name in ("1.npz", "0abc.npz", "notes.txt", "000099.npz", ".x.part", "000099.npz.orig"):
-        (out / "small.checkpoint" / name).write_bytes(b"mine")
-    assert invoke("run", config, "--output", out).exit_code == 0
-    assert contents(out) == undisturbed
 
 
 def test_another_configuration_is_refused(config: Path, out: Path) -> None:

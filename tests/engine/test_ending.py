@@ -1,37 +1,33 @@
-"""Cells run until their counts are final, if no end of the time is given."""
+"""Cells run until their counts are final, if no end of the time is given, and count as the signs of their spins say."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import ROOT, STANDARD, Write
+from support import ROOT, STANDARD
 from support.kernels import default_measures
 from support.runs import in_sittings, run_cells, same_numbers
 
 import sweep
 from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.models.theory import rocking
 
-SCENE = """\
-cases: cells.csv
-body: {a: 10.0, delta: 0.03}
-start: {n0: 0.05, x0: 0.01, y0: 0.01}
-"""
-CELLS = "mu,b\n106.09,2.322\n130,9.8\n75,3\n"
+SCENE = {
+    "name": "late", "cases": {"mu": [106.09, 130, 75], "b": [2.322, 9.8, 3]}, "body": {"a": 10.0, "delta": 0.03},
+    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
+}  # fmt: skip
 """The first reverses once more after t = 30 000, the second is nearly round, the third settles early."""
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    folder = tmp_path_factory.mktemp("final")
-    (folder / "cells.csv").write_text(CELLS, encoding="utf-8")
-    (folder / "small.yaml").write_text(SCENE, encoding="utf-8")
-    return sweep.run(folder / "small.yaml")
+def run() -> xr.Dataset:
+    return sweep.run(SCENE)
 
 
-def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset, write: Write) -> None:
-    write(CELLS, "cells.csv")
-    ended = sweep.run(write(SCENE), t_end=30_000.0)
+def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset) -> None:
+    ended = sweep.run(SCENE, t_end=30_000.0)
     assert list(ended.status) == [TIME_LIMIT, TIME_LIMIT, SETTLED]
     assert list(run.status) == [SETTLED, SETTLED, SETTLED]
     assert list((run.reversals - ended.reversals).values) == [1, 0, 0]
@@ -39,10 +35,10 @@ def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset, write: Wr
     assert list(run.decided[1:]) == [1, 1]  # the first grew from round-off, so it depends on the CPU whether it is
 
 
-def test_to_have_paused_changes_no_count(run: xr.Dataset, write: Write) -> None:
+def test_to_have_paused_changes_no_count(run: xr.Dataset) -> None:
     """The late reversal grows from round-off: neither its time nor the last digits of its margin are firm."""
-    write(CELLS.replace("130,9.8\n", ""), "cells.csv")
-    whole = sweep.run(write(SCENE), t_end=1e6, method="adams", estimate_errors=False)
+    cases = {"mu": [106.09, 75], "b": [2.322, 3]}
+    whole = sweep.run(SCENE | {"cases": cases}, t_end=1e6, method="adams", estimate_errors=False)
     np.testing.assert_array_equal(run.reversals[[0, 2]], whole.reversals)
     np.testing.assert_allclose(run.margin_more[[0, 2]], whole.margin_more, rtol=1e-3)
 
@@ -63,10 +59,8 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, write: Write) -> None:
-    write(CELLS, "cells.csv")
-    config = write(SCENE)
-    found, interruptions, _ = in_sittings(100, config, config.parent / "out")
+def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, tmp_path: Path) -> None:
+    found, interruptions, _ = in_sittings(100, SCENE, tmp_path)
     assert interruptions > 1
     same_numbers(found, run)
 
@@ -95,6 +89,15 @@ def test_shipped_configurations_end_decided(name: str) -> None:
 def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", estimate_errors=False)
     assert (found.status == SETTLED).all()
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", ["b", "mu", "quick"])
+def test_no_decided_count_contradicts_the_spin(name: str) -> None:
+    found = sweep.run(ROOT / "configs" / f"{name}.yaml", measure=["reversals", "margin"])
+    odd = np.sign(found.n0) * np.sign(found.spin_final) != (-1.0) ** found.reversals
+    assert not (odd & (found.decided == 1)).any()
+    assert (found.decided == 1).sum() > 20
 
 
 def test_settled_trajectories_stay_where_they_are_said_to() -> None:
@@ -152,3 +155,41 @@ def test_no_count_of_a_body_that_a_couple_slows_is_decided_too_early() -> None:
     decided = swept.decided == 1
     assert int(decided.sum()) > 80
     assert (swept.reversals == whole.reversals).values[decided].all()
+
+
+NEARLY_ROUND = {
+    "body": {"a": 10.0, "b": (1 + np.logspace(-6, -2, 5)).tolist(), "delta": 0.03},
+    "friction": {"mu": 100.0},
+    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
+    "measure": ["reversals", "margin"],
+}
+
+TOO_EARLY = {
+    (47.2841434079, 15.8501878478, 0.911245356655, 0.267442320328, 0.207115063054,
+     -0.164575311323, -2.21633302516, -1.27952228851): 1686.95,
+    (42.483166, 15.700788, 0.78415991, 0.13288258, 0.21073119, -0.18987983, 1.7206681, 1.5158422): 2411.47,
+    (41.067662, 20.796681, 1.8073354, 0.19627002, 1.2663982, -0.16939016, 4.0267689, -1.8686359): 238.84,
+}  # fmt: skip
+"""Bodies with little friction that settled before their spin reversed, and when it does (heyoka.py, Taylor series)."""
+
+
+def test_the_spin_of_a_nearly_round_body_reverses_once() -> None:
+    """Its slower mode has a period that outlasts the motion."""
+    found = sweep.run(NEARLY_ROUND, b=NEARLY_ROUND["body"]["b"][:4])
+    assert found.reversals.values.tolist() == [1, 1, 1, 1]
+    assert (found.spin_final < 0).all()
+    assert (found.decided == 1).all()
+
+
+def test_a_count_of_the_wrong_parity_is_not_decided(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rocking, "LONGEST", np.inf)
+    found = sweep.run(NEARLY_ROUND, b=1.00001)
+    assert (found.reversals.item(), found.spin_final.item() < 0, found.decided.item()) == (0, True, 0)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("cell", "reverses"), TOO_EARLY.items())
+def test_a_rattle_that_hardly_decays_does_not_settle(cell: tuple[float, ...], reverses: float) -> None:
+    found = sweep.run({"measure": ["reversals", "margin"]}, **dict(zip(STANDARD, cell, strict=True)))
+    assert found.reversals.item() == 1
+    assert found.t_last_reversal.item() == pytest.approx(reverses, rel=0.01)

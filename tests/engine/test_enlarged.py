@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write
+from support.physics import TURNS, stone
 from support.runs import Heard, Stop, same_numbers
 
 import sweep
@@ -34,15 +35,10 @@ def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.D
     return found, reporter.notes
 
 
-SCENE = """\
-name: small
-units: SI
-gravity: 9.81
-body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
-friction: {law: coulomb, mu: 0.3, regularisation: tanh, speed: 0.02, sigma: 1.0e-4}
-start: {roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]}
-integrator: {t_end: 1}
-"""
+SCENE = "name: small\n" + stone(
+    ("mu: 0.5", "mu: 0.3"), ("speed: 1.0e-3", "speed: 0.02"), ("pitch: 0.5", "pitch: 1"), (TURNS, "omega3: [-5, 5]"),
+    ("t_end: 5", "t_end: 1"),
+)  # fmt: skip
 
 
 def ranged(values: int) -> str:
@@ -245,7 +241,11 @@ def test_rerun_of_no_cells_leaves_a_dataset_that_can_grow(write: Write, tmp_path
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == {"small.nc": before}
 
 
-def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
+def test_rerun_needs_a_dataset_that_was_not_refined(write: Write, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"^rerun: it needs output, the folder of the run"):
+        sweep.run(write(ONE), rerun="failed")
+    with pytest.raises(StoreError, match=r"^--rerun: single cells of a refined run cannot .*; start anew with --fresh"):
+        grown(write, tmp_path / "out", ONE, rerun="failed", refine=1, tolerance=1e-9)
     with pytest.raises(StoreError, match="--rerun needs the dataset"):
         grown(write, tmp_path / "out", ONE, rerun="limit")
     with pytest.raises(ValueError, match="rerun must be failed or limit, not 'all'"):

@@ -8,19 +8,23 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support import Write
-from support.kernels import images, kernel
-from support.runs import Stop, same_numbers
+from support import Write, columns
+from support.kernels import images, kernel, threads
+from support.runs import in_sittings, same_numbers
 
 import sweep
+from sweep.config import load_config
 from sweep.engine import executor, life
-from sweep.engine.cells import Lives
+from sweep.engine.cells import COMPANION, RUN, Lives
+from sweep.engine.plan import plan
+from sweep.kernels import methods
 from sweep.kernels.kernel import Kernel
+from sweep.models import MODELS
 
 
 def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     rows = [(40, 2, 0.05), (60, 5, 0.02)]
-    text = "mu,b,n0\n" + "\n".join(",".join(map(str, row)) for row in rows)
+    text = "mu, b,n0\n" + "".join(f"{mu:.0e},{b},{n0}\n" for mu, b, n0 in rows) + "\n"
     (tmp_path / "cells.csv").write_text(text, encoding="utf-8")
     dataset = sweep.run(
         write("cases: cells.csv\nintegrator: {method: dopri5, t_end: 1500}\n", "table.yaml"), tmp_path / "out"
@@ -33,12 +37,6 @@ def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     same_numbers(xr.load_dataset(tmp_path / "out" / "table.nc"), dataset)
 
 
-def test_predict_gives_only_predictions(write: Write, small: xr.Dataset) -> None:
-    predicted = sweep.predict(write())
-    xr.testing.assert_identical(predicted["n_c2_minus"], small["n_c2_minus"])
-    assert "reversals" not in predicted
-
-
 def test_python_writes_nothing_by_itself(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     file = write()
@@ -46,50 +44,18 @@ def test_python_writes_nothing_by_itself(write: Write, tmp_path: Path, monkeypat
     assert list(tmp_path.iterdir()) == [file]
 
 
-@pytest.fixture
-def counted(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Steps that kernels take from now on, one number for each call."""
-    steps, plain = list[float](), Kernel.advance
-
-    def advance(kernel: Kernel, images: np.ndarray, *rest: Any) -> int:
-        before = kernel.table(images)["done"].sum()
-        blocks = plain(kernel, images, *rest)
-        steps.append(kernel.table(images)["done"].sum() - before)
-        return blocks
-
-    monkeypatch.setattr(Kernel, "advance", advance)
-    return steps
-
-
 @pytest.mark.usefixtures("short_chunks")
 def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.Dataset, counted: list[float]) -> None:
-    out, interruptions = tmp_path / "out", 0
+    out = tmp_path / "out"
     sweep.run(write())
     needed = sum(counted)
     counted.clear()
-    while True:
-        try:
-            dataset = sweep.run(write(), out, reporter=Stop(5))
-            break
-        except KeyboardInterrupt:
-            interruptions += 1
-            assert [path.name for path in out.iterdir()] == ["small.checkpoint"]
+    dataset, interruptions, last = in_sittings(5, write(), out)
     assert interruptions > 2
+    assert last.notes[0].startswith("resuming an earlier run: ")
     assert sum(counted) == needed
     same_numbers(dataset, small)
     assert {path.name for path in out.iterdir()} == {"small.nc", "small.png"}
-
-
-@pytest.mark.parametrize("size", [1, 5])
-def test_tiles_do_not_touch_the_numbers(
-    write: Write, tmp_path: Path, small: xr.Dataset, size: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr("sweep.engine.local.BATCH", 2)
-    same_numbers(sweep.run(write()), small)
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run(write(), tmp_path / "out", reporter=Stop(3))
-    same_numbers(sweep.run(write(), tmp_path / "out"), small)
 
 
 def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,3 +95,69 @@ def test_the_images_of_a_batch_go_with_it(monkeypatch: pytest.MonkeyPatch, write
         assert [reference() for reference in made] == [None]
     finally:
         gc.enable()
+
+
+MIXED = """\
+friction: {mu: [1.0, 60, 1000]}
+start: {n0: [0.02, 0.3]}
+integrator: {method: auto, t_end: 60}
+"""
+
+
+def test_the_cheapest_method_depends_on_friction_and_time() -> None:
+    slip = MODELS["slip"]
+    by_mu, *_ = methods.cheapest(slip, columns(mu=[1.0, 60.0, 1e3, 1e5]), 1e-6, 400.0)
+    assert list(by_mu[1:]) == ["adams"] * 3
+    assert methods.cheapest(slip, columns(), 1e-6, 1.0)[0] == "dopri5"
+    only, *_ = methods.cheapest(MODELS["averaged"], columns(), 1e-6, 400.0)
+    assert only == "dopri5"
+
+
+def test_auto_runs_each_cell_with_its_cheapest_method(write: Write) -> None:
+    mixed = sweep.run(write(MIXED))
+    names = np.array(list(methods.METHODS))[mixed["method"].values]
+    assert set(names.ravel()) == set(methods.METHODS)
+    assert mixed["method"].attrs["flag_meanings"] == " ".join(methods.METHODS)
+    for method in methods.METHODS:
+        alone = sweep.run(write(MIXED), method=method)
+        assert "method" not in alone
+        for name in ("spin_final", "reversals", "status", "step", "energy_error", "t_stop"):
+            np.testing.assert_array_equal(mixed[name].values[names == method], alone[name].values[names == method])
+
+
+@pytest.mark.usefixtures("short_chunks")
+def test_auto_resumes_from_a_checkpoint(write: Write, tmp_path: Path) -> None:
+    file = write(MIXED.replace("60}\n", "120}\n") + "name: mixed\n")
+    found, interruptions, _ = in_sittings(3, file, tmp_path / "out")
+    assert interruptions >= 2
+    same_numbers(found, sweep.run(file))
+
+
+MAP = {
+    "name": "lives",
+    "body": {"a": 10.0, "b": {"start": 2, "stop": 9, "num": 8}, "delta": 0.03},
+    "friction": {"mu": {"start": 40, "stop": 80, "num": 8}},
+    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
+    "integrator": {"method": "adams"},
+}
+
+
+def test_progress_counts_the_work_of_cells_whose_companions_run_beside_first_runs_of_others(
+    counted: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bar that is at 60 % has 60 % of the steps behind it, once enough runs have ended to guess the others by."""
+    monkeypatch.setattr("sweep.engine.executor._rescale", lambda *_: 100)  # chunks that do not depend on the machine
+    (each,), shares, beside = life.begin(plan(load_config(MAP)).parts), list[tuple[float, float]](), list[bool]()
+
+    def look() -> None:
+        shares.append((sum(counted), life.progress([each])[0] / 64))
+        beside.append(bool((each.stage == RUN).any() and (each.stage == COMPANION).any()))
+
+    with threads(1):
+        life.live([each], look)
+    work, told = np.array(shares).T
+    work /= sum(counted)
+    assert len(work) > 20
+    assert told[-1] == pytest.approx(1.0)
+    assert np.abs(told - work)[work > 0.5].max() < 0.1
+    assert any(beside)

@@ -130,6 +130,8 @@ def test_trajectories_of_samples_are_those_of_the_run(write: Write) -> None:
     assert sweep.trajectory(scene, samples=3, b=2, n0=0.05, t_end=10).n0.values.tolist() == [0.05] * 3
     named = {"samples": 3, "t_end": 10, "b": 2, **dict.fromkeys(sweep.load_config(scene).distributions, 0.02)}
     assert "sample" not in sweep.trajectory(scene, **named).coords
+    medians = sweep.trajectory(scene, t_end=10)
+    assert (medians["n0"].item(), medians["x0"].item()) == (0.05, 0.01)
     with pytest.raises(sweep.ConfigError, match="samples: needs a parameter that is a distribution"):
         sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, samples=3)
 
@@ -164,11 +166,6 @@ def test_tiles_cells_and_bodies_of_a_grid_with_a_table(
 @pytest.mark.parametrize("verb", ["critical", "boundaries"])
 def test_a_search_asks_for_numbers(write: Write, verb: str) -> None:
     refused(invoke(verb, write(SCENE)), "start.n0: is a distribution, which only run can sample")
-
-
-def test_a_trajectory_begins_at_the_medians(write: Write) -> None:
-    found = sweep.trajectory(write(SCENE), t_end=10)
-    assert (found["n0"].item(), found["x0"].item()) == (0.05, 0.01)
 
 
 def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:

@@ -58,7 +58,8 @@ def _refused(call: Callable[[], Any], *files: str) -> Any:
         return None
 
 
-def _round_trip(config: Any, folder: Path) -> None:
+def round_trip(config: Any, folder: Path) -> None:
+    """A configuration is the same when it is written to a file and read again, and its name stays in the folder."""
     again = folder / "again.yaml"
     again.write_text(config.to_yaml(), encoding="utf-8")
     other = load_config(again)
@@ -85,7 +86,7 @@ def _configuration(data: bytes, folder: Path) -> bool:
     tables = [str(folder / "cells.csv"), "/etc/passwd", "."]
     config = _refused(lambda: load_config(file), str(file), *tables)
     if config is not None:
-        _round_trip(config, folder)
+        round_trip(config, folder)
     return config is not None
 
 
@@ -111,7 +112,7 @@ def setting(random: Random, folder: Path) -> bool:
     names = (str(file), "--set", str(folder / "cells.csv"), "/etc/passwd")
     config = _refused(lambda: loaded(file, tuple(given)), *names)
     if config is not None:
-        _round_trip(config, folder)
+        round_trip(config, folder)
     return config is not None
 
 
@@ -164,28 +165,34 @@ def table(random: Random, folder: Path) -> bool:
         cells = [(name, number) for name, column in config.cases.items() for number in column]
         if wrong := [cell for cell in cells if not (np.isfinite(cell[1]) and PARAMETERS[cell[0]].allows(cell[1]))]:
             raise Violation(f"a case out of bounds: {wrong[0]} of {data!r}")
-        _round_trip(config, folder)
+        round_trip(config, folder)
     return config is not None
 
 
+def invoke(*line: str) -> int:
+    """Run the command line, which ends as it says, and in lines that help where it refuses; return its exit code."""
+    result = CliRunner().invoke(main, line)
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise Violation(f"{line}: {result.exception!r:.500}") from result.exception
+    lines = [line for line in result.stderr.splitlines() if "━" not in line]  # without bars of progress
+    helps = lines and (lines[0].startswith("Usage: ") or all(": " in line and len(line) < 1500 for line in lines))
+    if result.exit_code not in (0, 2, 3) or (result.exit_code == 2 and (result.stdout or not helps)):
+        raise Violation(f"{line}: {result.exit_code} {result.stdout!r:.300} {result.stderr!r:.600}")
+    return result.exit_code
+
+
 def _invoke(folder: Path, *arguments: str) -> bool:
-    """Run the command line: it exits with 0 or 2 whatever it is given, and writes nothing but the picture of `plot`."""
+    """Run the command line, which writes nothing but the picture of `plot`."""
     before = set(folder.rglob("*"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        result = CliRunner().invoke(main, list(arguments))
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise Violation(f"{arguments}: {result.exception!r:.500}") from result.exception
-    if result.exit_code not in (0, 2):
-        raise Violation(f"{arguments}: exit code {result.exit_code}")
-    if result.exit_code == 2 and (result.stdout or not result.stderr.strip()):
-        raise Violation(f"{arguments}: {result.stdout!r:.200} {result.stderr!r:.200}")
+        code = invoke(*arguments)
     if written := sorted(set(folder.rglob("*")) - before, reverse=True):
         for path in written:  # otherwise the same input would not fail again
             path.rmdir() if path.is_dir() else path.unlink()
-        if result.exit_code or written != [folder / "picture.png"]:
+        if code or written != [folder / "picture.png"]:
             raise Violation(f"{arguments}: written: {written}")
-    return result.exit_code == 0
+    return code == 0
 
 
 _FILES = count()

@@ -35,10 +35,6 @@ SCRAPS = (
     b"]", b"{", b"}", b",", b"#", b"&a ", b"*a ", b"!!", b"|\n", b">\n", b"'", b'"', b"\\", b"<<", b"1e999", b"\x7f",
 )  # fmt: skip
 
-# The measurements are those of a run by default, whose kernels are compiled already.
-MEASURE = "measure: [reversals, energy_error, noise_limited]"
-FILE_LIKE = ("name: x", "refine: 0", "max_failed_fraction: 0.01", MEASURE)
-
 
 def tree(random: Random) -> list[list[Any]]:
     """A valid configuration: pairs of a key and either text or more pairs."""
@@ -49,7 +45,9 @@ def tree(random: Random) -> list[list[Any]]:
         ["friction", [["mu", choose(("60", "[40, 60]", "{start: 20, stop: 200, num: 3}"))]]],
         ["start", [["n0", choose(("0.05", "[0.02, -0.05]"))], ["x0", choose(("0.01", "[0.0, 0.01]"))], ["y0", "1e-2"]]],
         ["integrator", [["t_end", "1500"], ["method", choose(("dopri5", "auto"))], ["tolerance", "1e-6"]]],
-        *([key, value] for key, value in (text.split(": ") for text in FILE_LIKE)),
+        ["name", "x"], ["refine", "0"], ["max_failed_fraction", "0.01"],
+        # As of a run by default, whose kernels are compiled already.
+        ["measure", "[reversals, energy_error, noise_limited]"],
         ["model", choose(("slip", "slip", "noslip", "analytic"))],
     ]  # fmt: skip
     kept = [pair for pair in pairs if pair[0] == "friction" or random.random() < 0.7]

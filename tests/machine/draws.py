@@ -260,14 +260,12 @@ def scene(base: Flat, changes: Draws, pool: set[Piece]) -> tuple[Flat, Config]:
         if path in changed and new.simulated and kernels(new) <= pool:
             flat, config = changed, new
     while config.grid.size > MOST_CELLS:
-        axis = min(
-            (name for name in config.axes if len(config.axes[name]) > 1), key=lambda name: len(config.axes[name])
-        )
+        longer = [name for name, values in config.axes.items() if len(values) > 1]
+        axis = min(longer, key=lambda name: len(config.axes[name]))
         flat, config = accepted(flat | {config.table[axis].path: list(config.axes[axis][:-1])})
     if (all_ := steps(config)) > MOST_STEPS:
-        flat, config = accepted(
-            flat | {"integrator.t_end": float(f"{config.integrator.t_end * MOST_STEPS / all_:.2g}")}
-        )
+        shorter = float(f"{config.integrator.t_end * MOST_STEPS / all_:.2g}")
+        flat, config = accepted(flat | {"integrator.t_end": shorter})
     return flat, config
 
 

@@ -42,9 +42,8 @@ def rows(dataset: xr.Dataset, cells: Any = slice(None)) -> Rows:
         if name not in PROBABILITIES and "count" not in variable.dims and name not in ("case", "sample"):
             along = [dim for dim in variable.dims if dim not in dims]
             whole = variable.broadcast_like(dataset["status"]).transpose(*dims, *along)
-            found[str(name)] = whole.values.reshape(dataset["status"].size, *(dataset.sizes[dim] for dim in along))[
-                cells
-            ]
+            shape = (dataset["status"].size, *(dataset.sizes[dim] for dim in along))
+            found[str(name)] = whole.values.reshape(shape)[cells]
     return found
 
 

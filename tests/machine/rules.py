@@ -23,8 +23,7 @@ import click
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
-from fuzzing import Violation, check_refusal
+from fuzzing import Violation, check_refusal, invoke, round_trip
 from hypothesis import event, note
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -35,7 +34,6 @@ import sweep
 from machine import draws, oracles, words
 from machine.draws import Draws, Flat, Piece
 from machine.meetings import Features, Meetings, features
-from sweep.cli import main
 from sweep.config import Config, ConfigError, load_config
 from sweep.config.document import parse_value
 from sweep.faults import Refused
@@ -195,9 +193,7 @@ class Machine(RuleBasedStateMachine):
 
     def _foreseen(self, scene: Scene, found: xr.Dataset | None = None) -> None:
         """It is the same when it is read again, and is predicted as it is run."""
-        again = load_config(self._written(scene.config.to_yaml()))
-        assert again.fingerprint() == scene.config.fingerprint(), "read again, another configuration"
-        assert list(again.axes) == list(scene.config.axes)
+        round_trip(scene.config, self.folder)
         invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")
         predicted = sweep.predict(scene.config)
         for name in predicted.data_vars if found is not None else ():
@@ -228,8 +224,7 @@ class Machine(RuleBasedStateMachine):
     @rule()
     def transposed(self) -> None:
         """The order of the axes makes no difference."""
-        turned = draws.nested(dict(reversed(self.scene.flat.items())))
-        self._compare(self._run({key: turned[key] for key in reversed(turned)}))
+        self._compare(self._run(draws.nested(dict(reversed(self.scene.flat.items())))))
 
     @precondition(lambda self: self.config.axes)
     @rule(number=NUMBER)
@@ -268,11 +263,8 @@ class Machine(RuleBasedStateMachine):
         keys = (self.config.table[name].path for name in columns)
         document = self.scene.with_({"cases": columns} | more, *keys, "samples", "cases", "picture", "refine")
         for method, _, specs in [("", "", ()), *sorted(self.pool)]:  # its own if it can be
-            own = (
-                {"measure": draws.written(specs), "integrator": document["integrator"] | {"method": method}}
-                if method
-                else {}
-            )
+            integrator = document.get("integrator", {}) | {"method": method}
+            own = {"measure": draws.written(specs), "integrator": integrator} if method else {}
             if self._allowed(document | own):
                 again = self._run(document | own)
                 ran = oracles.simulated(self.found)
@@ -563,14 +555,3 @@ class Machine(RuleBasedStateMachine):
             return draws.affordable(load_config(self.scene.with_({}), given), self.pool)
         except Refused:
             return True
-
-
-def invoke(*line: str) -> None:
-    """Run the command line, which ends as it says, and in lines that help where it refuses."""
-    result = CliRunner().invoke(main, line)
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    lines = [line for line in result.stderr.splitlines() if "━" not in line]  # without bars of progress
-    helps = lines and (lines[0].startswith("Usage: ") or all(": " in line and len(line) < 1500 for line in lines))
-    if result.exit_code not in (0, 2, 3) or (result.exit_code == 2 and (result.stdout or not helps)):
-        raise Violation(f"{line}: {result.exit_code} {result.stdout!r:.300} {result.stderr!r:.600}")

@@ -1,8 +1,5 @@
 """What every store promises."""
 
-import multiprocessing
-import os
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +18,10 @@ TILE = {
 RUNNING = Running([4, 2], {"dopri5": np.arange(6.0).reshape(2, 3)}, 1.5)
 
 
-def opened(folder: Path) -> Checkpoint:
-    return Checkpoint(folder / "x", Identity("name: x", "0" * 16, "1" * 16, "sweep 0"), pytest.fail)
-
-
 @pytest.fixture(params=["memory", "checkpoint"])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
-    return Store() if request.param == "memory" else opened(tmp_path)
+    identity = Identity("name: x", "0" * 16, "1" * 16, "sweep 0")
+    return Store() if request.param == "memory" else Checkpoint(tmp_path / "x", identity, pytest.fail)
 
 
 def same(found: dict[str, np.ndarray], saved: dict[str, np.ndarray]) -> None:
@@ -35,12 +29,6 @@ def same(found: dict[str, np.ndarray], saved: dict[str, np.ndarray]) -> None:
     assert {n: (v.dtype, v.shape, v.tobytes()) for n, v in found.items()} == {
         n: (v.dtype, v.shape, v.tobytes()) for n, v in saved.items()
     }
-
-
-def same_running(found: Running | None, seconds: float) -> None:
-    assert found is not None
-    assert (found.tiles, found.seconds) == (RUNNING.tiles, seconds)
-    same(found.tables, RUNNING.tables)
 
 
 def test_a_tile_comes_back_as_it_was_saved_last(store: Store) -> None:
@@ -56,24 +44,9 @@ def test_running_tiles_come_back_until_one_is_done(store: Store) -> None:
     store.save_running(RUNNING)
     store.save_running(RUNNING._replace(seconds=2.5))
     if isinstance(store, Checkpoint):
-        same_running(store.load_running(), 2.5)
+        found = store.load_running()
+        assert found is not None
+        assert (found.tiles, found.seconds) == (RUNNING.tiles, 2.5)
+        same(found.tables, RUNNING.tables)
     store.save(2, TILE)
     assert store.load_running() is None
-
-
-def save_and_die(folder: Path) -> None:
-    store = opened(folder)
-    store.save(7, TILE)
-    store.save_running(RUNNING)
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_a_checkpoint_outlives_its_process(tmp_path: Path) -> None:
-    process = multiprocessing.get_context("spawn").Process(target=save_and_die, args=(tmp_path,))
-    process.start()
-    process.join(60)
-    assert process.exitcode == -signal.SIGKILL
-    again = opened(tmp_path)
-    assert set(again.done) == {7}
-    same(again.load(7), TILE)
-    same_running(again.load_running(), 1.5)

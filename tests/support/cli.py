@@ -14,6 +14,11 @@ def invoke(*arguments: str | Path) -> Result:
 
 def refused(result: Result, *words: str) -> None:
     """It ended with exit code 2 and one line that has these words."""
-    assert result.exit_code == 2, result.output
-    assert all(word in result.stderr for word in words), result.stderr
-    assert len(result.stderr.splitlines()) == 1, result.stderr
+    one_line(result.exit_code, result.stderr, *words)
+
+
+def one_line(code: int, said: str, *words: str) -> None:
+    """The same of a command by its exit code and what it said."""
+    assert code == 2, said
+    assert [word for word in words if word not in said] == [], said
+    assert len(said.splitlines()) == 1, said

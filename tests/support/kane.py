@@ -25,17 +25,13 @@ from sweep.models import find
 from sweep.models.model import take
 from sweep.parameters import PARAMETERS
 
-from .newton import LAWS, axes, turned
+from .newton import LAWS, axes, rounded, turned
 
 Array = np.ndarray
 
 BODY = ("a", "b", "c", "offset", "mass", "gravity", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 STATE = ("roll", "pitch", "omega1", "omega2", "omega3", "s1", "s2")
 FORCES = ("k", "sigma", "kappa")
-
-
-def rounded(x: float, s: float) -> float:
-    return x if x >= s else x**2 / s * (1 - x / (3 * s)) + s / 3
 
 
 @cache

@@ -40,9 +40,7 @@ def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **p
     settle : give the kernel the critical spins, without which no cell settles
     """
     body = columns(**parameters)
-    stable = None
-    if settle:
-        stable = stability.stable_ranges(MODELS[kernel.model.name], body)
+    stable = stability.stable_ranges(MODELS[kernel.model.name], body) if settle else None
     return images_of(kernel, body, step, t_end, stable)
 
 

@@ -14,7 +14,7 @@ from sweep.models.general import laws
 Vector = np.ndarray
 
 
-def _rounded(x: float, s: float) -> float:
+def rounded(x: float, s: float) -> float:
     return x if x >= s else x**2 / s * (1 - x / (3 * s)) + s / 3
 
 
@@ -29,7 +29,7 @@ LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
     "none": lambda x, p: 0.0,  # noqa: ARG005
     "coulomb-sqrt": lambda x, p: p["mu"] * x / np.sqrt(x**2 + p["speed"] ** 2),
     "coulomb-tanh": lambda x, p: p["mu"] * np.tanh(x / p["speed"]),
-    "coulomb-cubic": lambda x, p: p["mu"] * x / _rounded(x, p["speed"]),
+    "coulomb-cubic": lambda x, p: p["mu"] * x / rounded(x, p["speed"]),
     "stribeck": _stribeck,
 }
 """Friction force per unit of normal force, at the slip velocity x >= 0: the package's laws."""
@@ -82,11 +82,11 @@ def _solution(y: Vector, p: Mapping[str, float], law: str | None) -> tuple[Vecto
     speed = np.linalg.norm(omega)
     matrix[3:6, 3:6], matrix[3:6, 6:] = J, -_cross(x_p)
     right[3:6] = -cross(omega, J @ omega) - p.get("sigma", 0.0) * omega
-    rolling = p["mu_rolling"] * p["radius"] / _rounded(speed, p["speed_rolling"]) if "mu_rolling" in p else 0.0
+    rolling = p["mu_rolling"] * p["radius"] / rounded(speed, p["speed_rolling"]) if "mu_rolling" in p else 0.0
     matrix[3:6, 8] += rolling * omega
     n = omega[2]
     spinning = (
-        p["mu_spinning"] * p["radius_spinning"] / _rounded(abs(n), p["speed_spinning"]) if "mu_spinning" in p else 0
+        p["mu_spinning"] * p["radius_spinning"] / rounded(abs(n), p["speed_spinning"]) if "mu_spinning" in p else 0
     )
     matrix[5, 8] += spinning * n
     # The acceleration of the point of the body in contact, plus that of the contact moving on in the body, is v'.
@@ -242,25 +242,18 @@ def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[f
     point[2] = p["c"] * np.sqrt(1 - point @ inverse @ point)
     u = -_unit(inverse @ point)
 
-    def height(_: float, y: Vector) -> float:
+    def height(y: Vector) -> float:
         return 1 - y[0] ** 2 - y[1] ** 2
 
     def slopes(_: float, y: Vector) -> Vector:
         return _solution(y, p, "viscous")[0]
 
-    def force(_: float, y: Vector) -> float:
-        return _solution(y, p, "viscous")[1]
-
-    def determinant(_: float, y: Vector) -> float:
-        return _solution(y, p, "viscous")[3]
-
-    def jams(t: float, y: Vector) -> float:
-        return force(t, y) - 1e6
-
-    def topples(t: float, y: Vector) -> float:
-        return height(t, y) - 1e-8
-
-    events = [force, jams, topples, determinant]
+    events = [
+        lambda _, y: _solution(y, p, "viscous")[1],  # lifts off
+        lambda _, y: _solution(y, p, "viscous")[1] - 1e6,  # jams
+        lambda _, y: height(y) - 1e-8,  # topples
+        lambda _, y: _solution(y, p, "viscous")[3],
+    ]
     for event in events:
         event.terminal = True  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):
@@ -269,8 +262,9 @@ def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[f
         )  # fmt: skip
     assert solution.status == 1
     y, time = solution.y[:, -1], solution.t[-1]
-    down, rates, left = np.array([*y[:2], -np.sqrt(height(time, y))]), slopes(time, y), 0.0
+    rates, force, _, determinant = _solution(y, p, "viscous")
+    down, left = np.array([*y[:2], -np.sqrt(height(y))]), 0.0
     if len(solution.t_events[2]):  # u3 vanishes linearly in time, so u3² does like its square
-        left = height(time, y) / (y[:2] @ rates[:2])
+        left = height(y) / (y[:2] @ rates[:2])
     spin = y[2:5] @ down + left * rates[2:5] @ down
-    return time + left, spin, height(time, y), force(time, y), determinant(time, y)
+    return time + left, spin, height(y), force, determinant

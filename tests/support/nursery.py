@@ -92,12 +92,7 @@ class Runs(AbstractContextManager["Runs"]):
             process.close()
 
 
-def command(
-    arguments: list[str],
-    log: Path,
-    *,
-    unprivileged: bool = False,
-) -> None:
+def command(arguments: list[str], log: Path, *, unprivileged: bool = False) -> None:
     """Run `sweep ARGUMENTS`, its output in `log`, with many tiles, groups and checkpoints.
 
     Parameters

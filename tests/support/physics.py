@@ -6,6 +6,7 @@ KANE_LEVINSON = {
 }  # fmt: skip
 """The body of Kane and Levinson (1982)."""
 
+TURNS = "omega1: 0, omega2: 0, omega3: -5, slip1: 0, slip2: 0"
 MOMENTS = ", Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5"
 
 STONE = f"""\
@@ -14,7 +15,7 @@ units: SI
 gravity: 9.81
 body: {{a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0{MOMENTS}}}
 friction: {{law: coulomb, mu: 0.5, regularisation: tanh, speed: 1.0e-3, sigma: 1.0e-4}}
-start: {{roll: 0.5 deg, pitch: 0.5 deg, omega1: 0, omega2: 0, omega3: -5, slip1: 0, slip2: 0}}
+start: {{roll: 0.5 deg, pitch: 0.5 deg, {TURNS}}}
 integrator: {{t_end: 5}}
 """
 
