@@ -43,7 +43,7 @@ _waiting: list[tuple[Callable[..., Any], bool]] = []
 
 
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-"""True if Numba is told not to compile: everything then runs in plain Python, on one thread, where a debugger stops."""
+"""True if Numba must not compile: everything then runs in plain Python, on one thread, where a debugger stops."""
 
 
 @cache
@@ -171,7 +171,7 @@ def threads() -> int:
 
 @contextmanager
 def all_threads() -> Iterator[None]:
-    """Let parallel functions run on all threads within, also if the calling thread has fewer."""
+    """Let parallel functions run on all threads within, even if the calling thread has fewer."""
     numba, usual = load_numba(), threads()
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     try:
@@ -286,17 +286,17 @@ class Cached:
                     self._dispatcher.compile(self._types)
 
     def is_ready(self) -> bool:
-        """Tell whether there is machine code in memory, or none is needed."""
+        """Return whether there is machine code in memory, or none is needed."""
         return INTERPRETED or bool(self._dispatcher.signatures)
 
     def is_compiled(self) -> bool:
-        """Tell whether the first call will find machine code, in memory or on disk."""
+        """Return whether the first call will find machine code, in memory or on disk."""
         # To look it up on disk takes a millisecond.
         self._found |= self.is_ready() or (self._cache is not None and self._cache.holds())
         return self._found
 
     def is_missing(self) -> bool:
-        """Tell whether another process could compile it into the cache on disk, which lacks it."""
+        """Return whether another process could compile it into the cache on disk, which lacks it."""
         return self._cache is not None and not self.is_compiled()
 
 

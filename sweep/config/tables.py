@@ -7,7 +7,7 @@ import io
 import re
 from dataclasses import dataclass, replace
 
-from sweep.faults import ConfigError, Fault, brief, either, fault_of
+from sweep.faults import ConfigError, Fault, brief, counted, either, fault_of
 from sweep.units import WRITTEN, Unit, factor, number, unit_of
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -141,7 +141,8 @@ def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separat
     if not (ragged := [(line, len(row)) for line, row in rows if len(row) != columns]):
         return
     line, values = ragged[0]
-    words = f"{values} values, but {columns} columns in line {top}, with {SEPARATORS[separator]} between them"
+    words = f"{counted(values, 'value')}, but {counted(columns, 'column')} in line {top}"
+    words += f", with {SEPARATORS[separator]} between them"
     words += f"; {len(ragged)} of {len(rows)} rows are like this" if len(ragged) > 1 else ""
     if separator == "," and values > columns:
         words += "; use semicolons between columns if numbers have decimal commas"

@@ -232,7 +232,7 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("a (kg),mu\n20,60\n", "cells.csv:1:1: a", "is in 'kg'; its unit must be m, cm, mm, in or ft"),
         ("a (cm),mu\n20,60\n", "small.yaml:2:1: cases.a", "is in c here; give the number without cm, or set units"),
         ("a,mu\n1,5,60\n", "cells.csv:2", "3 values, but 2 columns in line 1, with commas between them; use semicol"),
-        ("a;mu\n15\n", "cells.csv:2", "1 values, but 2 columns in line 1, with semicolons between them"),
+        ("a;mu\n15\n", "cells.csv:2", "1 value, but 2 columns in line 1, with semicolons between them"),
     ],
 )
 def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path: Path) -> None:
