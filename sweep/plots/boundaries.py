@@ -27,7 +27,8 @@ def draw(dataset: xr.Dataset) -> Picture:
     unsearched = dataset.attrs.get("pairs_not_searched")
     nothing = "no boundary was searched" if unsearched else "no count changes between the cells"
     nothing = "no boundary was found between the cells" if unsearched is None else nothing
-    panels = list(_panels(dataset, {x, y}))[:MAX_PANELS] or [(nothing, dataset)]
+    every = list(_panels(dataset, {x, y})) or [(nothing, dataset)]
+    panels = every[:MAX_PANELS]
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)
     figure = Picture(dataset, width * columns + 0.6, 1.2 + width * RATIO * rows)
@@ -48,7 +49,7 @@ def draw(dataset: xr.Dataset) -> Picture:
         axes.set(xlim=dataset[x].attrs["actual_range"], ylim=dataset[y].attrs["actual_range"])
     count = int((dataset["outcome"] == OPEN).sum())
     words = f"not found: a cell failed, or did not end ({count} of {dataset.sizes['point']})"
-    figure.explain([Line2D([], [], markersize=4, label=words, **_OPEN)] if count else [])
+    figure.explain([Line2D([], [], markersize=4, label=words, **_OPEN)] if count else [], len(every))
     return figure
 
 

@@ -31,7 +31,8 @@ def draw(dataset: xr.Dataset) -> Picture:
     dims = sorted(map(str, dataset["critical_reason"].dims), key=lambda d: -dataset.sizes[d])
     check(dataset, dims, "critical_reason")
     x = dims[0] if dims else ""
-    figure, frames = framed(dataset, indices(dataset, dims[1:])[:MAX_PANELS], x)
+    panels = indices(dataset, dims[1:])
+    figure, frames = framed(dataset, panels[:MAX_PANELS], x)
     styles = {
         f"{name}_{side}{suffix}": {"color": colour, "linewidth": 1, **style}
         for (name, colour), side, (suffix, (_, style)) in product(_COLOURS.items(), ("plus", "minus"), _SOURCES.items())
@@ -63,7 +64,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     figure.explain([
         *(Line2D([], [], color=colour, linewidth=4, label=words) for words, colour in names.items()),
         *(Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in sources),
-    ])  # fmt: skip
+    ], len(panels))  # fmt: skip
     return figure
 
 

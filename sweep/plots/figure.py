@@ -27,7 +27,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels
-from sweep.plots.panels import Panel, title
+from sweep.plots.panels import MAX_PANELS, Panel, title
 
 TEXT = 9.0
 """Text size in points for which lengths here are given in inches: a figure with smaller text is smaller."""
@@ -142,9 +142,16 @@ class Picture(Figure):
         """All axes except bars and second axes, which have labels."""
         return [axes for axes in self.axes if not axes.get_label()]
 
-    def explain(self, handles: Sequence[Artist]) -> None:
-        """Add a legend below the panels, in as many columns as fit, headed by the constants."""
+    def explain(self, handles: Sequence[Artist], panels: int = 0) -> None:
+        """Add a legend below the panels, in as many columns as fit, headed by the constants.
+
+        Parameters
+        ----------
+        panels : how many there would be, if the figure may hold fewer
+        """
         self._wrap_labels()
+        if panels > MAX_PANELS:
+            handles = [*handles, Line2D([], [], color="none", label=f"the first {MAX_PANELS} of {panels} panels")]
         if not handles and not self._constants:
             return
         room = max(1, int((self._width - _HANDLE) / _LETTER))

@@ -195,6 +195,13 @@ def test_critical_spins_that_do_not_exist() -> None:
     assert not [text for text in entries(some) if "simulation" in text or "c2" in text]
 
 
+def test_a_figure_names_the_panels_that_it_leaves_out() -> None:
+    bodies = critical({"n_c1_plus": [0.1] * 10}, [0] * 10).expand_dims(mu=np.arange(50.0, 62.0)).transpose("case", "mu")
+    figure = picture.plot(bodies.isel(case=slice(9)))
+    assert len(figure.axes) == 8
+    assert entries(figure)[-1] == "the first 8 of 9 panels"
+
+
 def test_the_critical_spins_of_one_body_are_seen() -> None:
     one = critical({"n_c1_plus": [0.1]}, [0]).isel(case=0)
     (axes,) = picture.plot(one).axes
