@@ -24,11 +24,13 @@ def a_source(**more: Any) -> tuple[Source, Setup]:
     return source, Setup(source)
 
 
-def test_counts_are_foreseen_and_then_simulated() -> None:
-    source, setup = a_source()
+@pytest.mark.parametrize("drag", [{}, {"sigma": 1e-3}], ids=["", "with a drag"])
+def test_counts_are_foreseen_and_then_simulated(drag: dict[str, float]) -> None:
+    friction = {"friction": RUN["friction"] | drag}
+    source, setup = a_source(**friction)
     shown = replace(state.first(source), changed={"delta": 0.05})
     coarse, fine, *_, last = found = list(dict.fromkeys(bodies.counts(setup, source, shown)))
-    other = RUN | {"body": {"b": RUN["body"]["b"], "delta": 0.05}}
+    other = RUN | {"body": {"b": RUN["body"]["b"], "delta": 0.05}} | friction
     foreseen = sweep.predict(other | {"measure": ["reversals", "foreseen"]})[COUNT].transpose(*last.dataset[COUNT].dims)
     np.testing.assert_array_equal(fine.dataset[COUNT], foreseen)
     np.testing.assert_array_equal(coarse.dataset[COUNT], foreseen[[0, 0, 0, 0, 4]][:, [0, 0, 0, 0, 4]])
@@ -55,6 +57,7 @@ def test_what_can_be_changed() -> None:
     """What is constant and has a scale, where two modes make the count; nothing in a table of cases."""
     source, setup = a_source(start={"n0": 0.05, "x0": 0.0})
     assert bodies.can_change(setup, source).keys() == {"a", "c", "delta", "n0", "y0"}
+    assert "sigma" in bodies.can_change(*reversed(a_source(friction=RUN["friction"] | {"sigma": 1e-3})))
     assert bodies.can_change(None, source) == {}
     for more in ({"model": "averaged"}, {"body": {}, "cases": {"b": [2.0, 3.0]}, "friction": {"mu": 60}}):
         source = Source(sweep.run(RUN | {"body": {"b": [2.0, 3.0]}} | more))
