@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import images, kernel, run
+from support.kernels import PAPER_FORM, images, kernel, run
 
 import sweep
 from sweep.kernels.adams import stretches
@@ -14,9 +14,6 @@ from sweep.models import MODELS
 from sweep.models.general import rigid_body
 from sweep.models.ladder import slip
 from sweep.models.stiff.modes import _rocking
-from sweep.models.stiff.slip import form_of
-
-PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 
