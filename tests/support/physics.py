@@ -1,10 +1,17 @@
 """Bodies of any shape and friction, as parameters and as a configuration."""
 
+from typing import Any
+
 KANE_LEVINSON = {
     "a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 1.0, "gravity": 9.81,
     "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5,
 }  # fmt: skip
 """The body of Kane and Levinson (1982)."""
+
+IN_SI: dict[str, Any] = {
+    "units": "SI", "gravity": 9.81, "body": {name: value for name, value in KANE_LEVINSON.items() if name != "gravity"},
+}  # fmt: skip
+"""It as a part of a configuration."""
 
 MOMENTS = ", Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5"
 
