@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support import columns
 from support.kernels import PAPER_FORM, images, kernel, run
+from support.physics import turned_inertia
 
 import sweep
 from sweep.kernels.adams import stretches
@@ -37,14 +38,8 @@ def test_so_they_do_for_a_real_body() -> None:
     """The same body in SI, by its moments of inertia."""
     length, gravity, mass = 0.02, 9.81, 0.3
     time, moment = np.sqrt(length / gravity), mass * length**2
-    I1, I2, I3 = (float(each[0]) for each in rigid_body.homogeneous(columns()))
+    inertia = turned_inertia(*(float(each[0]) for each in rigid_body.homogeneous(columns())), 0.03)
     cos, sin = np.cos(0.03), np.sin(0.03)
-    inertia = {
-        "Ixx": I1 * cos**2 + I2 * sin**2,
-        "Iyy": I1 * sin**2 + I2 * cos**2,
-        "Izz": I3,
-        "Ixy": (I1 - I2) * sin * cos,
-    }
     turned = {"x0": 0.01 * (cos - sin), "y0": 0.01 * (sin + cos)}
     body = {"a": 10 * length, "b": 3 * length, "c": length, "mass": mass}
     scene = {

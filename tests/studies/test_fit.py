@@ -13,6 +13,7 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from support import ROOT, Write, adaptive, columns, newton
 from support.cli import invoke
+from support.physics import turned_inertia
 
 import sweep
 from sweep.config import ConfigError
@@ -555,15 +556,11 @@ def random_film(random: np.random.Generator) -> tuple[dict[str, Any], Film, np.n
     """
     a, b, c = random.uniform(0.05, 0.2), random.uniform(0.02, 0.045), random.uniform(0.01, 0.018)
     delta, mass = random.uniform(0.01, 0.2) * random.choice([-1, 1]), random.uniform(0.05, 1.0)
-    first, second, third = (mass / 5 * (p**2 + q**2) for p, q in ((b, c), (a, c), (a, b)))
-    cos, sin = np.cos(delta), np.sin(delta)
-    solid = {
-        "a": a, "b": b, "c": c, "mass": mass, "Ixx": first * cos**2 + second * sin**2, "Izz": third,
-        "Iyy": first * sin**2 + second * cos**2, "Ixy": (first - second) * sin * cos,
-    }  # fmt: skip
+    moments = (mass / 5 * (p**2 + q**2) for p, q in ((b, c), (a, c), (a, b)))
+    solid = {"a": a, "b": b, "c": c, "mass": mass} | turned_inertia(*moments, delta)
     law = str(random.choice(list(LAWS)))
     friction = LAWS[law] | {"mu": LAWS[law]["mu"] * random.uniform(0.5, 2)}
-    friction["sigma"] = third / np.exp(random.uniform(np.log(5), 4))
+    friction["sigma"] = solid["Izz"] / np.exp(random.uniform(np.log(5), 4))
     start = {"n0": random.choice([-1, 1]) * random.uniform(1, 8)}
     start["x0"] = a * np.exp(random.uniform(np.log(0.004), np.log(0.1)))
     start["y0"] = b * np.exp(random.uniform(np.log(0.004), np.log(0.1))) * random.choice([-1, 1])

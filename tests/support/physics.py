@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 KANE_LEVINSON = {
     "a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 1.0, "gravity": 9.81,
     "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2e-5,
@@ -24,6 +26,15 @@ friction: {{law: coulomb, mu: 0.5, regularisation: tanh, speed: 1.0e-3, sigma: 1
 start: {{roll: 0.5 deg, pitch: 0.5 deg, omega1: 0, omega2: 0, omega3: -5, slip1: 0, slip2: 0}}
 integrator: {{t_end: 5}}
 """
+
+
+def turned_inertia(first: float, second: float, third: float, angle: float) -> dict[str, float]:
+    """Moments and product of inertia in axes from which the principal ones are turned by `angle` about the third."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    product = (first - second) * sin * cos
+    return {
+        "Ixx": first * cos**2 + second * sin**2, "Iyy": first * sin**2 + second * cos**2, "Izz": third, "Ixy": product,
+    }  # fmt: skip
 
 
 def stone(*changes: tuple[str, str]) -> str:
