@@ -188,11 +188,7 @@ def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
 @pytest.mark.parametrize(
     ("header", "clock", "words"),
     [
-        (
-            "t,n",
-            1e9,
-            "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its",
-        ),
+        ("t,n", 1e9, "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its"),
         ("t,n", 1e3, "name the unit in the header, such as 'time (ms)'"),
         ("t (s),n", 1e3, "the film lasts 1900, but trajectories 5; raise t_end, or cut the film"),
     ],
