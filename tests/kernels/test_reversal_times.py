@@ -80,13 +80,9 @@ def test_cycles_are_those_of_the_reversal_times() -> None:
     for row, mean, variation in zip(times, found.cycle_mean.values, found.cycle_variation.values, strict=True):
         known = row[np.isfinite(row)]
         lengths = known[2:] - known[:-2]
-        if len(lengths):
-            np.testing.assert_allclose(mean, lengths.mean(), rtol=1e-12)
-        else:
-            assert np.isnan(mean)
-        if len(lengths) > 1:
-            np.testing.assert_allclose(variation, lengths.std(ddof=1) / lengths.mean(), rtol=1e-6, atol=1e-9)
-        else:
-            assert np.isnan(variation)
+        expected = lengths.mean() if len(lengths) else np.nan
+        spread = lengths.std(ddof=1) / expected if len(lengths) > 1 else np.nan
+        np.testing.assert_allclose(mean, expected, rtol=1e-12)
+        np.testing.assert_allclose(variation, spread, rtol=1e-6, atol=1e-9)
     assert np.isnan(found.cycle_mean).any()
     assert (found.cycle_variation > 0.01).any()

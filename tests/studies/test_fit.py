@@ -1,7 +1,7 @@
 """Fits to films that another derivation has made, their intervals, and laws of friction compared by them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -126,54 +126,48 @@ def test_an_interval_ends_where_the_misfit_has_risen_by_a_quantile(write: Write,
             assert misfit(found[f"{side}_{level}"].item()) - least == pytest.approx(rise, rel=0.06)
 
 
+Curve = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
 class Toy(Problem):
-    """A problem in shares of two ranges, the residuals of which are those of a formula: film - curve(places)."""
+    """A problem in shares of two ranges, the residuals of which are those of a formula: film - curve(places, times)."""
+
+    curve: Curve
+    turned: list[int]
 
     @property
     def mirrored(self) -> list[int]:
-        return []
-
-    def curve(self, places: np.ndarray) -> np.ndarray:
-        raise NotImplementedError
+        return self.turned
 
     def answers(self, places: Any, *_: Any) -> Any:
-        return iter([self.film.value - self.curve(each) for each in places])
+        return iter([self.film.value - self.curve(each, self.film.time) for each in places])
 
 
-class Linear(Toy):
+def linear(places: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Two parameters that are tied: their columns have a correlation of 0.9."""
-
-    def curve(self, places: np.ndarray) -> np.ndarray:
-        turns = self.film.time
-        columns = np.stack([np.cos(turns), 0.9 * np.cos(turns) + 0.44 * np.sin(turns)])
-        return np.asarray((places - 0.5) @ columns)
+    columns = np.stack([np.cos(turns), 0.9 * np.cos(turns) + 0.44 * np.sin(turns)])
+    return np.asarray((places - 0.5) @ columns)
 
 
-class Twofold(Toy):
+def twofold(places: np.ndarray, _: np.ndarray) -> np.ndarray:
     """Two valleys, at 0.3 and 0.7, the second of which is shallower by a quarter; a wall of 16 stands between them."""
-
-    def curve(self, places: np.ndarray) -> np.ndarray:
-        x, y = places.T
-        return np.stack([100 * ((x - 0.5) ** 2 - 0.04), (x - 0.3) / 0.8, 50 * (y - 0.5 * x)], axis=1)
+    x, y = places.T
+    return np.stack([100 * ((x - 0.5) ** 2 - 0.04), (x - 0.3) / 0.8, 50 * (y - 0.5 * x)], axis=1)
 
 
-class Turned(Toy):
+def opposite(places: np.ndarray, _: np.ndarray) -> np.ndarray:
     """A start at (0.7, 0.7), which half a turn takes to the same motion at (0.3, 0.3)."""
-
-    @property
-    def mirrored(self) -> list[int]:
-        return [0, 1]
-
-    def curve(self, places: np.ndarray) -> np.ndarray:
-        x, y = (places - 0.5).T
-        return np.stack([100 * (x * y - 0.04), 100 * (x**2 - 0.04)], axis=1)
+    x, y = (places - 0.5).T
+    return np.stack([100 * (x * y - 0.04), 100 * (x**2 - 0.04)], axis=1)
 
 
-def toy(of: type[Toy], value: np.ndarray, error: float | None) -> Toy:
+def toy(curve: Curve, value: np.ndarray, error: float | None) -> Toy:
     times = np.linspace(0, 20, len(value))
     free = {name: Range(0.0, 1.0, 1e9) for name in ("mu", "n0")}
     film = Film(times, value, None if error is None else np.ones(len(value)))
-    return of(cast("sweep.Config", None), film, free, np.ones(len(value), bool))
+    problem = Toy(cast("sweep.Config", None), film, free, np.ones(len(value), bool))
+    problem.curve, problem.turned = curve, [0, 1] if curve is opposite else []
+    return problem
 
 
 def found_near(problem: Toy, *places: list[float]) -> list[Minimum]:
@@ -184,7 +178,7 @@ def test_intervals_hold_as_many_truths_as_they_say() -> None:
     """Of noise that the film does not tell; 200 films, so that a share has a standard error of 3 and 2 %."""
     random, held = np.random.default_rng(7), []
     for _ in range(200):
-        problem = toy(Linear, random.normal(0, 0.1, 40), None)
+        problem = toy(linear, random.normal(0, 0.1, 40), None)
         _, limits, _ = intervals(problem, found_near(problem, [0.5, 0.5]), lambda _: None)
         held.append((limits[:, 0] < 0.5) & (limits[:, 1] > 0.5))
     shares = np.mean(held, axis=0)
@@ -194,7 +188,7 @@ def test_intervals_hold_as_many_truths_as_they_say() -> None:
 
 def test_an_interval_holds_other_minima_that_fit_as_well() -> None:
     """A wall beside the best one hides the second from its profile."""
-    problem = toy(Twofold, np.zeros(3), 1.0)
+    problem = toy(twofold, np.zeros(3), 1.0)
     minima = found_near(problem, [0.3, 0.15], [0.7, 0.35])
     assert [each.misfit for each in minima] == pytest.approx([0, 0.25], abs=0.01)
     best, limits, _ = intervals(problem, minima, lambda _: None)
@@ -209,7 +203,7 @@ def test_intervals_of_two_valleys_hold_as_many_truths_as_they_say(places: list[l
     """Also where the search did not find the valley of the truth; 60 films, so that shares have errors of 6 and 3 %."""
     random, truth, held = np.random.default_rng(3), np.array([0.3, 0.15]), []
     for _ in range(60):
-        problem = toy(Twofold, random.normal(0, 1, 3), 1.0)
+        problem = toy(twofold, random.normal(0, 1, 3), 1.0)
         minima = sorted(found_near(problem, *places), key=lambda each: each.misfit)
         _, limits, _ = intervals(problem, minima, lambda _: None)
         held.append((limits[:, 0] < truth) & (truth < limits[:, 1]))
@@ -219,7 +213,7 @@ def test_intervals_of_two_valleys_hold_as_many_truths_as_they_say(places: list[l
 
 
 def test_an_interval_of_a_start_holds_no_opposite_start_of_the_same_motion() -> None:
-    problem = toy(Turned, np.zeros(2), 1.0)
+    problem = toy(opposite, np.zeros(2), 1.0)
     _, limits, _ = intervals(problem, found_near(problem, [0.7, 0.7]), lambda _: None)
     assert (limits > 0.5).all()
     assert (limits[:, 0] < 0.7).all()
