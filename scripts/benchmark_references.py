@@ -137,6 +137,15 @@ def half_windows(case: Case, end: float) -> Array:
     return half * np.arange(1, np.floor(end / half) + 1)
 
 
+def ripple_free_of(y: Any, A: Any, inertia: Any, K: Any, numbers: Any) -> Any:
+    """n* of the package's states u1, u2, ω, v1 and v2."""
+    u1, u2, *omega, v1, v2 = y
+    u = [u1, u2, -numbers.sqrt(1.0 - (u1 * u1 + u2 * u2))]
+    v_p = [v1, v2, -(v1 * u1 + v2 * u2) / u[2]]
+    _, x_p, _ = example.contact(u, omega, A, numbers)
+    return ripple_free(u, omega, example.add(v_p, example.cross(x_p, omega)), x_p, inertia, K)
+
+
 def ripple_free(u: Any, omega: Any, v_g: Any, x_p: Any, inertia: Any, K: Any) -> Any:
     """n* of `data/README.md`."""
     M = example.add(example.moment_of(omega, inertia), example.scaled(-1, example.cross(x_p, v_g)))
@@ -213,7 +222,7 @@ def package_equations(case: Case) -> tuple[Array, Rhs, Callable[[Array], tuple[A
 
     A last state of a body that slips is the integral of n*.
     """
-    model = find("noslip+solid+sigma" if rolls(case) else "slip")
+    model = find("noslip+solid+sigma+offset+gravity" if rolls(case) else "slip")
     states, numbers = problem(model, {"omega1": 0.0, "omega2": 0.0} | case, Extended)
     constants, weight = model.constants(*numbers), case.get("gravity", 1.0)
 
@@ -227,12 +236,7 @@ def package_equations(case: Case) -> tuple[Array, Rhs, Callable[[Array], tuple[A
     A, K = (constants.A11, constants.A22, constants.A33, constants.A12), window_of(case)[1].astype(Extended)
 
     def rhs(y: Array) -> Any:
-        u1, u2, *omega, v1, v2, _ = y
-        u = [u1, u2, -np.sqrt(1 - u1 * u1 - u2 * u2)]
-        v_p = [v1, v2, -(v1 * u1 + v2 * u2) / u[2]]
-        _, x_p, _ = example.contact(u, omega, A, np)
-        v_g = example.add(v_p, example.cross(x_p, omega))
-        return [*model.rhs(tuple(y[:7]), constants)[0], ripple_free(u, omega, v_g, x_p, inertia, K)]
+        return [*model.rhs(tuple(y[:7]), constants)[0], ripple_free_of(y[:7], A, inertia, K, np)]
 
     return np.array([*states, 0]), rhs, seen
 

@@ -20,19 +20,19 @@ many of them as a tool runs), against the Taylor series in 80-bit arithmetic of 
 
     pip install -e .[peers]
     apt-get install gfortran && pip install -e .[peers-fortran]
-    python scripts/peers.py [--mu 60 200 1000] [--bodies 1024] [--repeats 5] [--output FOLDER]
+    python scripts/peers.py FOLDER
 
 writes peers.csv and peers.png.  Tools that are not installed are left out.
 """
 
 from __future__ import annotations
 
-import argparse
 import copy
 import csv
 import math
 import os
 import statistics
+import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -58,6 +58,7 @@ THREADS = 2
 T_END = float(TIMES[-1])
 N_STATES, N_CONSTANTS = len(MODEL.states), len(MODEL.constants._fields)
 
+MU, BODIES, REPEATS = (60.0, 200.0, 1000.0), 1024, 5
 SLOW_SECONDS, SLOW_REPEATS = 2.0, 3
 """Runs that take longer than `SLOW_SECONDS` are repeated no more than `SLOW_REPEATS` times."""
 
@@ -70,6 +71,8 @@ COMPARED = 8
 OURS = (1e-4, 1e-6, 1e-8, 1e-10)
 """Tolerances of sweep's runs; the others' are such that the errors cover the same range."""
 HEYOKA, DOP853, LSODA, TSIT5 = (1e-3, 1e-6, 1e-9), (1e-4, 1e-7, 1e-10), (1e-6, 1e-8, 1e-10), (1e-4, 1e-6, 1e-8)
+MARKERS = "os^v<D>px+"
+"""Of the curves of the picture, in their order; their colours are matplotlib's."""
 RTOL_TO_ATOL = 1e-3
 """Absolute over relative tolerance: the rattle's states are of order 1e-3."""
 
@@ -310,9 +313,9 @@ def prepare(problem: Problem) -> list[Entry]:
     return entries
 
 
-def measure(entries: list[Entry], repeats: int) -> None:
+def measure(entries: list[Entry]) -> None:
     """Time all entries in turns, the slow ones less often, and print a line for each."""
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         for entry in entries:
             if len(entry.seconds) < SLOW_REPEATS or statistics.median(entry.seconds) < SLOW_SECONDS:
                 began = time.perf_counter()
@@ -338,21 +341,6 @@ def write(path: Path, found: dict[float, list[Entry]]) -> None:
                 rows.writerow([f"{mu:g}", e.tool, e.setting, e.problem.size, *times, f"{e.error:.2g}"])
 
 
-STYLES: dict[str, dict[str, Any]] = {
-    "sweep, auto": {"color": "C3", "linewidth": 2.2, "marker": "o"},
-    "sweep, auto, counts alone": {"color": "C3", "linewidth": 1, "marker": "o", "fillstyle": "none"},
-    "sweep, dopri5": {"color": "C1", "linewidth": 2.2, "marker": "s"},
-    "sweep, dopri5, counts alone": {"color": "C1", "linewidth": 1, "marker": "s", "fillstyle": "none"},
-    "heyoka batch": {"color": "C0", "marker": "^"},
-    "numbalsoda DOP853": {"color": "C2", "marker": "v"},
-    "numbalsoda LSODA": {"color": "C2", "marker": "<", "linestyle": "--"},
-    "diffrax Tsit5": {"color": "C4", "marker": "D"},
-    "SciPy DOP853, 1 process": {"color": "0.5", "marker": "x"},
-    "SciPy LSODA, 1 process": {"color": "0.5", "marker": "+", "linestyle": "--"},
-}
-"""The curves of the picture."""
-
-
 def draw(path: Path, found: dict[float, list[Entry]]) -> None:
     """Draw speed against error, a panel for each friction."""
     from matplotlib.figure import Figure
@@ -360,9 +348,9 @@ def draw(path: Path, found: dict[float, list[Entry]]) -> None:
     figure = Figure((3.6 * len(found) + 0.6, 5), dpi=110, layout="constrained")
     grid = figure.subplots(1, len(found), sharey=True, squeeze=False).ravel()
     for axes, (mu, entries) in zip(grid, found.items(), strict=True):
-        for tool, style in STYLES.items():
+        for tool, marker in zip(dict.fromkeys(e.tool for e in entries), MARKERS, strict=False):
             some = sorted((e for e in entries if e.tool == tool), key=Entry.milliseconds)
-            axes.loglog([e.error for e in some], [e.milliseconds() for e in some], label=tool, markersize=5, **style)
+            axes.loglog([e.error for e in some], [e.milliseconds() for e in some], label=tool, marker=marker)
         axes.set(title=f"μ = {mu:g}", xlabel="largest error in spin", xlim=(2e-13, 1e-3))
         axes.grid(alpha=0.3)
     grid[0].set_ylabel("milliseconds per trajectory")
@@ -371,25 +359,20 @@ def draw(path: Path, found: dict[float, list[Entry]]) -> None:
     figure.savefig(path)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--mu", type=float, nargs="+", default=[60.0, 200.0, 1000.0])
-    parser.add_argument("--bodies", type=int, default=1024)
-    parser.add_argument("--repeats", type=int, default=5, help="timed runs of each quick entry")
-    parser.add_argument("--output", type=Path, default=Path("runs/peers"), help="folder for peers.csv and peers.png")
-    options = parser.parse_args()
+def main(output: Path) -> None:
+    """Write the table and the picture, again after each friction."""
     if hasattr(os, "sched_setaffinity"):  # XLA cannot be limited to some of the processors otherwise.
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:THREADS])
     numba.set_num_threads(THREADS)
-    options.output.mkdir(parents=True, exist_ok=True)
+    output.mkdir(parents=True, exist_ok=True)
     found = dict[float, list[Entry]]()
-    for mu in options.mu:
-        print(f"\nμ = {mu:g}, T = {T_END:g}, {options.bodies} bodies with b = 2 … 8")
-        found[mu] = prepare(Problem(mu, np.linspace(2.0, 8.0, options.bodies)))
-        measure(found[mu], options.repeats)
-        write(options.output / "peers.csv", found)
-        draw(options.output / "peers.png", found)
+    for mu in MU:
+        print(f"\nμ = {mu:g}, T = {T_END:g}, {BODIES} bodies with b = 2 … 8")
+        found[mu] = prepare(Problem(mu, np.linspace(2.0, 8.0, BODIES)))
+        measure(found[mu])
+        write(output / "peers.csv", found)
+        draw(output / "peers.png", found)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]))

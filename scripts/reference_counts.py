@@ -9,7 +9,8 @@ At each moment ω', v_g' and the normal force R solve one linear system of seven
     u · v_g' - (u × x_p) · ω'  = (x_p' × ω) · u - v_p · u'     from (v_p · u)' = 0, v_p = v_g - x_p × ω
 
 and SciPy's DOP853 integrates it at tight tolerances, with the integral of the ripple-free spin n* (`reversals.py`) as a
-tenth state.  A cell whose count a tiny change could alter (see `Trajectory.fault` and `reference`) is left out.
+tenth state.  Bodies and starts are those of `data/benchmark/example_scipy.py`.  A cell whose count a tiny change could
+alter (see `Trajectory.fault` and `reference`) is left out.
 
     python scripts/reference_counts.py OUTPUT
 
@@ -20,7 +21,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,14 @@ Array = NDArray[np.float64]
 # A matrix, the moments of inertia, μ and K: what `motion` takes beside the state.
 Body = tuple[Array, Array, float, Array]
 
-TABLE = Path(__file__).parents[1] / "data" / "reference_counts.csv"
+DATA = Path(__file__).parents[1] / "data"
+TABLE = DATA / "reference_counts.csv"
+sys.path.append(str(DATA / "benchmark"))
+import example_scipy as example  # noqa: E402  # from a folder of data
+
+Cell = dict[str, float]
+"""A body, its friction and its start, in units of c and sqrt(c/g)."""
+NAMES = ("a", "b", "delta", "mu", "n0", "x0", "y0")
 
 # Steps allowed for a trajectory: some minutes.
 MAX_STEPS = 3_000_000
@@ -48,39 +56,6 @@ GRAZING = 1e-4
 SETTLED_RATTLE = 1e-6
 # Settled spin must be stable with this factor to spare; then Δn <= (rattle)/(I3 · distance) = 1e-5 n.
 SETTLED_MARGIN = 1.05
-
-
-@dataclass(frozen=True)
-class Cell:
-    """A body, its friction and its start, in units of c and sqrt(c/g)."""
-
-    a: float
-    b: float
-    delta: float
-    mu: float
-    n0: float
-    x0: float
-    y0: float
-
-    def shape(self) -> Array:
-        """Matrix A of the squared semi-axes, in the axes of inertia."""
-        cos, sin = np.cos(self.delta), np.sin(self.delta)
-        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        return turn.T @ np.diag([self.a**2, self.b**2, 1.0]) @ turn
-
-    def inertia(self) -> Array:
-        """Principal moments of inertia."""
-        return np.array([self.b**2 + 1, self.a**2 + 1, self.a**2 + self.b**2]) / 5
-
-    def start(self) -> Array:
-        """State at t = 0: contact at (x0, y0), ω = n0 u, no slip velocity; the integral of n* is 0."""
-        inverse = np.linalg.inv(self.shape())
-        flat = np.array([self.x0, self.y0])
-        x_p = np.array([self.x0, self.y0, np.sqrt(1 - flat @ inverse[:2, :2] @ flat)])
-        u = -inverse @ x_p
-        u /= np.linalg.norm(u)
-        omega = self.n0 * u
-        return np.concatenate([u, omega, np.cross(x_p, omega), [0.0]])
 
 
 @dataclass
@@ -161,10 +136,12 @@ def has_settled(state: Array, average: float, body: Body) -> bool:
 
 def simulate(cell: Cell, rtol: float) -> Trajectory:
     """Integrate one cell until it settles, lifts off, or reaches the time or step limit."""
-    shape, inertia = cell.shape(), cell.inertia()
+    given = example.slipping_body(cell | {"c": 1.0})
+    (A11, A22, A33, A12), moments, mu = given
+    shape, inertia = np.array([[A11, A12, 0.0], [A12, A22, 0.0], [0.0, 0.0, A33]]), np.array(moments)
     window, ripple = window_and_ripple(shape, inertia)
-    body = shape, inertia, cell.mu, ripple
-    solver = DOP853(lambda _t, state: motion(state, *body)[0], 0.0, cell.start(), T_END, rtol=rtol, atol=ATOL)
+    body, start = (shape, inertia, mu, ripple), np.array([*example.slipping_start(cell, given), 0.0])
+    solver = DOP853(lambda _t, state: motion(state, *body)[0], 0.0, start, T_END, rtol=rtol, atol=ATOL)
     found = Trajectory(window)
     while found.end == "step limit" and found.steps < MAX_STEPS:
         solver.step()
@@ -188,7 +165,7 @@ def reference(cell: Cell) -> tuple[Trajectory, str]:
     first = simulate(cell, 1e-11)
     if fault := first.fault():
         return first, fault
-    second = simulate(replace(cell, x0=cell.x0 * (1 + 1e-9)), 1e-10)
+    second = simulate(cell | {"x0": cell["x0"] * (1 + 1e-9)}, 1e-10)
     if fault := second.fault():
         return first, f"{fault} in the repetition"
     return first, "" if second.reversals() == first.reversals() else "count differs in the repetition"
@@ -196,17 +173,16 @@ def reference(cell: Cell) -> tuple[Trajectory, str]:
 
 def main(output: Path) -> None:
     """Compute the cells of the table again, write those with a firm count, and print a line for each."""
-    names = [field.name for field in fields(Cell)]
     with TABLE.open(encoding="utf-8", newline="") as stream:
-        cells = [Cell(*(float(row[name]) for name in names)) for row in csv.DictReader(stream)]
+        cells = [{name: float(row[name]) for name in NAMES} for row in csv.DictReader(stream)]
     with output.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([*names, "reversals", "t_last_reversal"])
+        writer.writerow([*NAMES, "reversals", "t_last_reversal"])
         for cell in cells:
             run, fault = reference(cell)
             count, last = run.reversals(), run.last_reversal()
             if not fault:
-                writer.writerow([*astuple(cell), count, f"{last:.2f}"])
+                writer.writerow([*cell.values(), count, f"{last:.2f}"])
                 stream.flush()
             print(f"{cell} {count=} {last=:.2f} {run.steps=} {fault or 'recorded'}", flush=True)
 

@@ -24,7 +24,7 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from benchmark_references import UNIT, Case, window_of
+from benchmark_references import UNIT, Case, ripple_free_of, window_of
 from reversals import T_END, Means
 from tracing import taylor_system
 
@@ -77,24 +77,12 @@ def draw() -> list[Case]:
 
 def system() -> list[tuple[Any, Any]]:
     """Equations of the slip model in multiples of `SCALE`, and of the integral of n*."""
-    equations, (spin, *_) = taylor_system(slip.MODEL, SCALE)
+    equations, _ = taylor_system(slip.MODEL, SCALE)
     unscaled = tuple(state * k for (state, _), k in zip(equations, SCALE, strict=True))
     *constants, K11, K12, K21, K22 = (heyoka.par[i] for i in range(CONSTANTS + 4))
-    M1, M2 = momentum(unscaled, slip.MODEL.constants(*constants))
-    ripple = unscaled[0] * (K11 * M1 + K12 * M2) + unscaled[1] * (K21 * M1 + K22 * M2)
-    return [*equations, (heyoka.make_vars("integral"), spin - ripple)]
-
-
-def momentum(states: tuple[Any, ...], p: slip.MODEL.constants) -> tuple[Any, Any]:
-    """M1 and M2 of M = I ω - x_p × v_g with v_g = v_p + x_p × ω, as symbols."""
-    u1, u2, w1, w2, w3, v1, v2 = states
-    u3 = -heyoka.sqrt(1.0 - (u1 * u1 + u2 * u2))
-    of_u = p.A11 * u1 + p.A12 * u2, p.A12 * u1 + p.A22 * u2, p.A33 * u3
-    height = heyoka.sqrt(u1 * of_u[0] + u2 * of_u[1] + u3 * of_u[2])
-    x, y, z = (-component / height for component in of_u)
-    v3 = -(u1 * v1 + u2 * v2) / u3
-    g1, g2, g3 = v1 + y * w3 - z * w2, v2 + z * w1 - x * w3, v3 + x * w2 - y * w1
-    return w1 / p.inv_I1 - (y * g3 - z * g2), w2 / p.inv_I2 - (z * g1 - x * g3)
+    p, K = slip.MODEL.constants(*constants), np.array([[K11, K12], [K21, K22]])
+    steady = ripple_free_of(unscaled, (p.A11, p.A22, p.A33, p.A12), (p.J11, p.J22, p.J33), K, heyoka)
+    return [*equations, (heyoka.make_vars("integral"), steady)]
 
 
 def make_integrator(real: Any, tolerance: float) -> Any:
@@ -165,7 +153,7 @@ def has_settled(states: Array, constants: Array) -> bool:
     spin, *_ = slip.MODEL.energy(states, p)
     within = MARGIN * reach(states, constants)
     near = spin + np.linspace(-1, 1, 5) * within
-    return bool(within < abs(spin) and all(linear.growth_rate(slip.MODEL, p, n) < 0 for n in near))
+    return bool(within < abs(spin) and (linear.growth_rate(slip.MODEL, p, near) < 0).all())
 
 
 # --- while the rattle is tiny -----------------------------------------------------------------

@@ -19,6 +19,7 @@ import csv
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
@@ -34,7 +35,6 @@ from tracing import taylor_system
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Array, Model
-from sweep.models.theory import coefficients
 
 Case = dict[str, float]
 Rhs = Callable[[Array], Any]
@@ -85,12 +85,21 @@ def arctan(x: Array) -> Array:
 
 
 def problem(model: Model, case: Case, real: Any) -> tuple[list[Any], list[Any]]:
-    """States at t = 0 and constants, as numbers of the type `real`."""
-    columns = {name: np.array([real(value)]) for name, value in case.items()}
-    functions = {"arctan": arctan, "cos": lambda x: np.cos(typed(x)), "sin": lambda x: np.sin(typed(x))}
+    """States at t = 0 and constants, as numbers of the type `real`; arrays of 128-bit numbers are of objects."""
+    kind = object if real is Quadruple else real
+    columns = {name: np.array([real(value)], dtype=kind) for name, value in case.items()}
+    functions = {"arctan": arctan} | {each.__name__: of_objects(each) for each in (np.cos, np.sin, np.sqrt)}
     numbers = SimpleNamespace(**{**vars(np), **functions})
-    with mock.patch.object(coefficients, "np", numbers):
-        return [s[0] for s in model.start(columns)], [real(p[0]) for p in model.constants.of(columns)]
+    with ExitStack() as patches:
+        for name, module in sys.modules.copy().items() if real is Quadruple else ():
+            if name.startswith("sweep.models.") and vars(module).get("np") is np:
+                patches.enter_context(mock.patch.object(module, "np", numbers))
+        return [real(s[0]) for s in model.start(columns)], [real(p[0]) for p in model.constants.of(columns)]
+
+
+def of_objects(function: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """`function` of arrays of objects, which can be multiplied by Python's numbers."""
+    return lambda x: function(typed(x)).astype(object)
 
 
 def check_contact(model: Model, states: Any, constants: Any) -> Any:

@@ -1,7 +1,9 @@
-"""The comparison of datasets by `scripts/same_numbers.py` finds whatever is planted, to the last bit."""
+"""`same_numbers` finds whatever is planted, to the last bit, and scripts make rows of the reference tables again."""
 
+import csv
 import runpy
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -55,3 +57,30 @@ def test_what_differs_is_named(
     found = list(SAME["differences"](one, other))
     assert [each for each in found if not SAME["meant"](each)] == wrong
     assert [each for each in found if SAME["meant"](each)] == aside
+
+
+@pytest.mark.campaign
+def test_scripts_make_rows_of_the_reference_tables_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They use the package's equations, and so a change of these may break them."""
+    pytest.importorskip("heyoka")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    names = ("benchmark_references", "reference_counts_500", "reference_wide", "reference_spins")
+    benchmark, counts, wide, spins = map(import_module, names)
+    case, (first, *_), _ = benchmark.all_cases()["kane_levinson_left"]
+    found = benchmark.compute("kane_levinson_left", case, np.array([first]), benchmark.Taylor("roll")).spins
+    row = next(row for row in rows("benchmark/references.csv") if row["case"] == "kane_levinson_left")
+    assert found == pytest.approx([float(row["spin"])], abs=1e-15)
+    run = counts.follow(counts.draw()[4], counts.make_integrator(float, counts.TOLERANCE), float)
+    row = rows("reference_counts_500.csv")[4]
+    assert [run.reversals(), run.last_reversal()] == pytest.approx([1, float(row["t_last_reversal"])], abs=1e-3)
+    (spin, *_), _, end, t_end = wide.own_run(wide.draw(wide.SEED)[0], wide.own_integrator(wide.TOLERANCE))
+    row = rows("reference_wide.csv")[0]
+    assert (end, t_end, spin) == (row["end"], float(row["t_end"]), pytest.approx(float(row["spin_50"]), abs=1e-15))
+    model, row = spins.MODELS["slip"], rows("../sweep/bench/data/reference_spins.csv")[0]
+    found = spins.taylor_spins(model, spins.SLIP[0], spins.Quadruple, spins.QUADRUPLE_TOLERANCES[0])[0]
+    assert f"{spins.as_decimals([found])[0]:.18g}" == row["spin"]
+
+
+def rows(table: str) -> list[dict[str, str]]:
+    with (ROOT / "data" / table).open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))

@@ -28,6 +28,7 @@ from PIL import Image
 from support import ROOT, own
 
 import sweep
+from sweep.explorer.runner import Job
 from sweep.explorer.slices import Source
 from sweep.plots import animation, labels
 
@@ -380,20 +381,30 @@ def test_another_body_is_foreseen_and_then_simulated(visit: Open, counts: np.nda
     page.close()
 
 
-def document_of(dataset: xr.Dataset, **query: str) -> Any:
-    """The document that the server makes of an address, without a browser."""
+def document_of(dataset: xr.Dataset, **query: str) -> tuple[Any, Any]:
+    """The document that the server makes of an address, without a browser, and its view."""
     from bokeh.document import Document
 
     from sweep.explorer.view import View
 
     document = Document()
-    View(document, Source(dataset), None, None, {key: [value] for key, value in query.items()})
-    return document
+    return document, View(document, Source(dataset), None, None, {key: [value] for key, value in query.items()})
+
+
+@pytest.mark.parametrize("values", [1, 2])
+def test_an_axis_of_one_value_has_no_slider(opened: xr.Dataset, values: int, caplog: pytest.LogCaptureFixture) -> None:
+    from bokeh.models import Slider
+
+    document, _ = document_of(opened.isel(n0=slice(values)), n0="0.02")
+    document.validate()
+    names = {model.name for model in document.select({"type": Slider})}
+    assert {"mu", "b", "n0"} - names == ({"n0"} if values == 1 else set())
+    assert not caplog.records
 
 
 def test_no_cell_is_told_along_other_axes(opened: xr.Dataset) -> None:
     """Until the pointer is on one: its indices were those of the old axes."""
-    document = document_of(opened, x="mu", y="b")
+    document, _ = document_of(opened, x="mu", y="b")
     cell = document.get_model_by_name("cell")
     nothing = cell.text
     document.get_model_by_name("probe").data = {"i": [1], "j": [1]}
@@ -407,13 +418,7 @@ def test_no_cell_is_told_along_other_axes(opened: xr.Dataset) -> None:
 
 def test_news_of_a_page_that_is_gone_end_its_run_alone(opened: xr.Dataset) -> None:
     """Bokeh takes the document apart first; the thread of the trajectories, which all pages share, has to go on."""
-    from bokeh.document import Document
-
-    from sweep.explorer.runner import Job
-    from sweep.explorer.view import View
-
-    document, job = Document(), Job({}, lambda _: None)
-    view = View(document, Source(opened), None, None, {})
+    (document, view), job = document_of(opened), Job({}, lambda _: None)
     document.callbacks.destroy()
     view._report(job)
     assert job.dropped
@@ -568,6 +573,9 @@ def test_the_page_is_dark_where_the_system_is(visit: Open, opened: xr.Dataset) -
     settle(page)
     wait_for_curves(page, 1)
     assert max(grounds()) < 60
+    tip(page, 1, 1)
+    colour = page.locator(".bk-Tooltip").first.evaluate("e => getComputedStyle(e).backgroundColor")
+    assert max(map(int, re.findall(r"\d+", colour)[:3])) < 60
     counts = opened["reversals"].isel(n0=N0).values
     assert (pixels(page, 2, 2) == colour_in_palette(page, int(counts[2, 2]))).all(axis=1).mean() > 0.8
     page.get_by_role("button", name="Light or dark page").click()
@@ -590,21 +598,6 @@ def test_a_click_shows_its_curves_without_scrolling(visit: Open, width: int) -> 
     # News of a run stand between the parts of the page, not over them.
     assert page.evaluate("getComputedStyle(document.querySelector('#notice')).position") == "static"
     page.close()
-
-
-def test_the_tooltip_of_a_dark_page_is_dark(page: Page) -> None:
-    page.evaluate("localStorage.removeItem('theme')")  # what another test may have chosen
-    page.emulate_media(color_scheme="dark")
-    page.wait_for_function("document.documentElement.dataset.theme === 'dark'")
-    (x, y), tip = place(page, 1, 1), page.locator(".bk-Tooltip").first
-    for i in range(60):  # a map that is just being drawn does not notice the pointer
-        page.mouse.move(x + i % 2, y)
-        page.wait_for_timeout(500)
-        if tip.is_visible():
-            break
-    tip.wait_for()
-    colour = tip.evaluate("e => getComputedStyle(e).backgroundColor")
-    assert max(map(int, re.findall(r"\d+", colour)[:3])) < 60
 
 
 def test_nothing_runs_out_of_the_window(clicked: Page) -> None:

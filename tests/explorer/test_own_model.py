@@ -4,9 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import Result
 from support import own
-from support.cli import invoke
 from support.own import PENDULUM
 
 import sweep
@@ -108,13 +106,3 @@ def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Pat
     (tmp_path / "saved.yaml").write_text(text, encoding="utf-8")
     again = sweep.run(tmp_path / "saved.yaml")
     np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])
-
-
-@pytest.mark.browser
-def test_the_command_refuses_it_before_it_serves(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "other.py").write_text(PENDULUM + "\n", encoding="utf-8")
-    result: Result = invoke("explore", folder / "pendulum.nc", "--no-browser", "--model", tmp_path / "other.py")
-    assert result.exit_code == 2
-    assert result.stderr.startswith("--model: ")
-    assert "other.py has " in result.stderr
-    assert "running the code" not in result.stderr

@@ -1,6 +1,7 @@
 """Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
 
-from dataclasses import fields
+from collections.abc import Callable
+from dataclasses import fields, replace
 from itertools import permutations
 from pathlib import Path
 
@@ -8,8 +9,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import sweep
 from sweep.explorer import slices, state
 from sweep.explorer.slices import PlacedAxis, Source, open_source
+from sweep.kernels.status import LIFT_OFF
 from sweep.results.store import StoreError
 
 
@@ -77,14 +80,44 @@ def test_one_axis_is_a_row(opened: xr.Dataset) -> None:
     np.testing.assert_array_equal(part.values, opened["reversals"].isel(b=0, n0=0).values[None])
 
 
-@pytest.mark.parametrize("dims", [(), ("trajectory", "sample")])
-def test_what_has_no_map_is_refused(dims: tuple[str, ...]) -> None:
-    dataset = xr.Dataset({"status": (dims, np.zeros([2] * len(dims), "int8"))})
-    with pytest.raises(StoreError, match="open a dataset of run"):
-        Source(dataset, "x.nc")
+@pytest.mark.browser
+@pytest.mark.parametrize(
+    ("show", "change", "said"),
+    [
+        (Source, lambda _: xr.Dataset({"status": 0}), "open a dataset of run"),
+        (Source, lambda _: xr.Dataset({"status": (("trajectory", "sample"), [[0, 0]])}), "open a dataset of run"),
+        (Source, lambda whole: whole.rename(mu="show"), "the axis show has the name"),
+        (sweep.explore, lambda whole: whole.isel(mu=slice(0, 0)), "the axis mu has no values"),
+        (sweep.explore, lambda whole: whole.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
+    ],
+)
+def test_what_has_no_map_is_refused(
+    show: Callable[[xr.Dataset], object], change: Callable[[xr.Dataset], xr.Dataset], said: str, opened: xr.Dataset
+) -> None:
+    with pytest.raises(StoreError, match=said):
+        show(change(opened))
 
 
-def test_no_axis_has_the_name_of_a_key_of_the_address(opened: xr.Dataset) -> None:
+def test_no_axis_has_the_name_of_a_key_of_the_address() -> None:
     assert {field.name for field in fields(state.State)} - {"cells", "at", "limits", "changed"} < slices.ADDRESS
-    with pytest.raises(StoreError, match="the axis show has the name"):
-        Source(opened.rename(mu="show"))
+
+
+@pytest.mark.browser
+def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
+    from sweep.explorer import style
+
+    source = Source(opened.assign(status=xr.full_like(opened["status"], LIFT_OFF)))
+    part = source.map("reversals", "mu", "b", {"n0": 1})
+    assert not part.shown.size
+    assert style.beyond(part, style.scale_of(part, state.first(source))) == ""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Dataset, low: float) -> None:
+    from sweep.explorer import style
+
+    source = Source(opened.assign(t_first_reversal=opened["b"], t_first_reversal_predicted=2 * opened["mu"]))
+    part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
+    scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
+    assert style.mapping(scales[0]) == style.mapping(scales[1])

@@ -2,12 +2,11 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from support import ROOT
+from support.processes import python
 
 from sweep import jit
 
@@ -40,10 +39,8 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def process(copy: Path, *measures: str) -> list[tuple[str, float]]:
     """Whether a new process finds the kernel of each set of measurements, and the spin that it comes to."""
-    command = [sys.executable, "-c", SCRIPT, *measures]
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=True)
-    return [(line.split()[0], pytest.approx(float(line.split()[1]), rel=1e-13)) for line in done.stdout.splitlines()]
+    lines = python("-c", SCRIPT, *measures, folder=copy, NUMBA_CACHE_DIR="").stdout.splitlines()
+    return [(line.split()[0], pytest.approx(float(line.split()[1]), rel=1e-13)) for line in lines]
 
 
 @pytest.mark.campaign

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from support import adaptive, columns
-from support.kernels import finish, images, kernel, run, spin
+from support.kernels import PAPER_FORM, finish, images, kernel, run, spin
 from support.ripple import form as numerical_form
 
 from sweep.kernels import methods
@@ -15,9 +15,6 @@ from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import take
-from sweep.models.stiff.slip import form_of
-
-PAPER_FORM = form_of(slip.MODEL)
 
 DOPRI = kernel("dopri5")
 STATES = len(slip.MODEL.states)

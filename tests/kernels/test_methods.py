@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import finish, images, run, spin, threads
+from support.kernels import PAPER_FORM, finish, images, run, spin, threads
 from support.kernels import kernel as make
 
 from sweep.kernels.adams import start_up
@@ -16,10 +16,6 @@ from sweep.kernels.layout import LANES, PACK
 from sweep.kernels.methods import METHODS, automatic_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, SETTLED, TIME_LIMIT
 from sweep.models import MODELS
-from sweep.models.ladder import slip
-from sweep.models.stiff.slip import form_of
-
-PAPER_FORM = form_of(slip.MODEL)
 
 KERNELS = {method: make(method) for method in METHODS}
 each_method = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)

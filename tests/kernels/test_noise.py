@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import images, kernel, run
+from support.kernels import PAPER_FORM, images, kernel, run
+from support.physics import turned_inertia
 
 import sweep
 from sweep.kernels.adams import stretches
@@ -14,9 +15,6 @@ from sweep.models import MODELS
 from sweep.models.general import rigid_body
 from sweep.models.ladder import slip
 from sweep.models.stiff.modes import _rocking
-from sweep.models.stiff.slip import form_of
-
-PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 
@@ -39,25 +37,14 @@ def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
 def test_so_they_do_for_a_real_body() -> None:
     """The same body in SI, by its moments of inertia."""
     length, gravity, mass = 0.02, 9.81, 0.3
-    time, moment = np.sqrt(length / gravity), mass * length**2
-    I1, I2, I3 = (float(each[0]) for each in rigid_body.homogeneous(columns()))
-    cos, sin = np.cos(0.03), np.sin(0.03)
-    inertia = {
-        "Ixx": I1 * cos**2 + I2 * sin**2,
-        "Iyy": I1 * sin**2 + I2 * cos**2,
-        "Izz": I3,
-        "Ixy": (I1 - I2) * sin * cos,
-    }
-    turned = {"x0": 0.01 * (cos - sin), "y0": 0.01 * (sin + cos)}
-    body = {"a": 10 * length, "b": 3 * length, "c": length, "mass": mass}
-    scene = {
-        "units": "SI",
-        "gravity": gravity,
-        "body": body | {name: moment * value for name, value in inertia.items()},
-        "friction": {"mu": [mu * time / length for mu in LAST | FIRM]},
-        "start": {"n0": 0.05 / time} | {name: length * value for name, value in turned.items()},
-    }
-    found = sweep.run(scene, method="adams", t_end=45_000 * time, estimate_errors=False)
+    time, cos, sin = np.sqrt(length / gravity), np.cos(0.03), np.sin(0.03)
+    principal = (mass * length**2 * float(each[0]) for each in rigid_body.homogeneous(columns()))
+    body = {"a": 10 * length, "b": 3 * length, "c": length, "mass": mass} | turned_inertia(*principal, 0.03)
+    start = {"n0": 0.05 / time, "x0": 0.01 * (cos - sin) * length, "y0": 0.01 * (sin + cos) * length}
+    found = sweep.run(
+        {"units": "SI", "gravity": gravity, "body": body, "start": start},
+        mu=[mu * time / length for mu in LAST | FIRM], method="adams", t_end=45_000 * time, estimate_errors=False,
+    )  # fmt: skip
     assert list(found.reversals) == [n for n, _ in (LAST | FIRM).values()]
     np.testing.assert_allclose(found.t_last_reversal / time, [t for _, t in (LAST | FIRM).values()], rtol=1e-3)
     assert not found.noise_limited.any()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import finish, images_of, kernel, spin, threads
+from support.kernels import PAPER_FORM, finish, images_of, kernel, spin, threads
 
 import sweep
 from sweep.kernels.adams import start_up
@@ -16,9 +16,6 @@ from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Columns, take
-from sweep.models.stiff.slip import form_of
-
-PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS, DOPRI = kernel("adams"), kernel("dopri5")
 

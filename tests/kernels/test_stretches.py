@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import adaptive, columns
-from support.kernels import finish, images, kernel
+from support.kernels import PAPER_FORM, finish, images, kernel
 
 import sweep
 from sweep.kernels.adams import stretches
@@ -15,10 +15,7 @@ from sweep.models import find
 from sweep.models.ladder import slip
 from sweep.models.model import MODES, stack, take
 from sweep.models.stiff.modes import RATTLE, Rattle, bending
-from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear, stability
-
-PAPER_FORM = form_of(slip.MODEL)
 
 ADAMS = kernel("adams")
 row = ADAMS.layout.index

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import ROOT, newton
+from support.physics import turned_inertia
 
 import sweep
 
@@ -18,9 +19,7 @@ CYCLE = {"roll": -0.655, "pitch": 0.369, "omega1": -0.245, "omega2": -0.909, "om
 
 def in_its_surface(p: dict[str, float]) -> dict[str, Any]:
     """The body in the axes of its surface."""
-    cos, sin = np.cos(p["delta"]), np.sin(p["delta"])
-    inertia = {"Ixx": p["I1"] * cos**2 + p["I2"] * sin**2, "Iyy": p["I1"] * sin**2 + p["I2"] * cos**2, "Izz": p["I3"],
-               "Ixy": (p["I1"] - p["I2"]) * sin * cos}  # fmt: skip
+    inertia = turned_inertia(p["I1"], p["I2"], p["I3"], p["delta"])
     shape = {"surface": "paraboloid", "a": 0.5 / p["a1"], "b": 0.5 / p["a2"], "c": 1.0, "offset": 0.0}
     return shape | inertia | {"mass": 1.0, "gravity": G}
 

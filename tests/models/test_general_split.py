@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from support import columns
 
 from sweep.models import find
+from sweep.models.ladder import slip
 from sweep.models.model import Columns
 from sweep.models.stiff.form import velocities
+from sweep.models.stiff.modes import slow_rates
 from sweep.models.stiff.slip import form_of, has_form
 from sweep.models.theory.rocking import frequencies, implicit
 
@@ -108,3 +111,23 @@ def test_the_ripple_is_that_of_the_full_model() -> None:
 )
 def test_models_that_have_no_split_form(name: str) -> None:
     assert not has_form(find(name))
+
+
+def test_no_function_takes_the_states_of_another_model() -> None:
+    """Momentum and spin are alike in size, so a right-hand side of the wrong variables would pass unseen."""
+    body, stiff = columns(), form_of(slip.MODEL).model
+    with pytest.raises(NotImplementedError):
+        stiff.rhs(stiff.start(body), stiff.constants.of(body))
+    with pytest.raises(NotImplementedError):
+        stiff.upright(np.ones(1))
+    assert stiff.path is None
+
+
+def test_fast_spin_has_a_mode_of_negative_energy() -> None:
+    """Friction makes that one grow, at the cost of the spin, and the body rises; no leap may use it."""
+    body = columns(a=[1.05, 1.05], b=1.04, mu=5000.0)
+    form = form_of(slip.MODEL)
+    rates, _, sound = slow_rates(form, form.model.constants.of(body), np.array([0.05, 5.0]))
+    np.testing.assert_array_equal(sound, [True, False])
+    assert (rates[0].real < 0).all()
+    assert rates[1].real.max() > 0

@@ -105,12 +105,7 @@ def test_the_mirror_image_reverses_at_the_same_time() -> None:
     ],
 )
 def test_where_there_is_no_time_there_is_a_reason(model: str, given: dict[str, float], reason: str) -> None:
-    scene: dict[str, Any] = {"model": model, "measure": FIRST, "body": {}, "start": {}}
-    friction = {name: value for name, value in given.items() if name in ("mu", "sigma")}
-    for name, value in given.items():
-        if name not in friction:
-            scene["body" if name in ("b", "delta", "offset") else "start"][name] = value
-    found = sweep.predict(scene | {"friction": friction})
+    found = sweep.predict({"model": model, "measure": FIRST}, **given)
     assert REASONS[int(found.reversal_time_reason)] == reason
     assert bool(np.isfinite(found.t_first_reversal_predicted)) == (reason == "predicted")
 

@@ -282,6 +282,12 @@ def test_axes_in_any_order_of_values() -> None:
         ({"x": "b", "y": "b"}, "y: b is the other axis already"),
         ({"cmap": "q"}, "cmap: there is no colour map q; choose"),
         ({"limits": (2, 1)}, r"limits: must be a lower and a higher finite number"),
+        ({"limits": (0, np.inf)}, r"limits: must be a lower and a higher finite number"),
+        ({"limits": ("a", "b")}, r"limits: must be a lower and a higher finite number"),
+        ({"figsize": (1,)}, r"figsize: must be a width and a height in inches, such as \(6, 4\), not \(1,\)"),
+        ({"figsize": (0, 2)}, "figsize: must be a width"),
+        ({"sel": ["n0"]}, "sel: must be values by axis"),
+        ({"width": 3}, "width: 3; give a length between 50 and 1000 mm"),
         ({"limits": (0, 2), "variable": "ratio", "ax": Figure().subplots()}, r"limits: 0..2; give numbers above zero"),
         ({"variable": "q"}, "variable: there is no variable q; choose reversals"),
         ({"output": "x.jpg"}, "output: x.jpg: unknown format; write a png, pdf, svg or eps"),
@@ -289,7 +295,7 @@ def test_axes_in_any_order_of_values() -> None:
 )
 def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
     whole = 1.0 * made().reversals
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=f"^{said}"):
         picture.plot(made().assign(t_first_reversal=whole, t_first_reversal_predicted=2 * whole), **wrong)
 
 

@@ -18,7 +18,7 @@ import sweep
 from sweep.config import ConfigError
 from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
-from sweep.plots.figure import opaque, panel_width
+from sweep.plots.figure import opaque
 from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.kind import CRITICAL
 from sweep.results.margins import POINTS
@@ -111,28 +111,6 @@ def test_boundaries_without_a_whole_number_are_not_drawn() -> None:
     curves = sweep.boundaries({"friction": {"mu": [60, 80]}}, n0=[0.02, 0.06], t_end=1000, bracket=0.1)
     with pytest.raises(StoreError, match=r"^the dataset: has no whole numbers in level"):
         picture.plot(curves.where(False))
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"figsize": (1,)}, r"^figsize: must be a width and a height in inches, such as \(6, 4\), not \(1,\)"),
-        ({"figsize": (0, 2)}, "^figsize: must be a width"),
-        ({"limits": ("a", "b")}, "^limits: must be a lower and a higher finite number"),
-        ({"limits": (0, np.inf)}, "^limits: must be a lower and a higher finite number"),
-        ({"sel": ["n0"]}, "^sel: must be values by axis"),
-        ({"width": 3}, "^width: 3; give a length between 50 and 1000 mm"),
-    ],
-)
-def test_arguments_of_another_kind_are_refused(given: dict[str, Any], said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
-        picture.plot(made(), **given)
-
-
-def test_panels_on_a_page_smaller_than_what_stands_around_them_have_a_width() -> None:
-    """So that the figure can be drawn, and found too small."""
-    with mpl.rc_context({"figure.figsize": (1, 1)}):
-        assert panel_width(1, 4.4, 1.2) > 0
 
 
 def test_samples_without_a_status_or_counts() -> None:

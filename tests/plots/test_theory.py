@@ -3,11 +3,14 @@
 And where their numbers and symbols stand.
 """
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.transforms import Bbox
+from support.figures import made
 
 import sweep
 from sweep.axis import Axis
@@ -15,8 +18,8 @@ from sweep.kernels.status import DIVERGED, SETTLED
 from sweep.models import MODELS
 from sweep.models.ladder import analytic
 from sweep.models.theory import stability
-from sweep.plots import description, picture
-from sweep.plots.theory import Line, crossings, lines
+from sweep.plots import description, picture, places
+from sweep.plots.theory import Line, Points, crossings, lines
 from sweep.results.kind import CRITICAL
 
 BODY = {"a": 10.0, "c": 1.0, "delta": 0.03}
@@ -118,3 +121,69 @@ def test_a_cell_without_a_count_breaks_no_line_between_the_others() -> None:
     assert len(found["1"]) == 1
     (x, y), *_ = found["1"]
     assert [x.max(), y.min(), y.max()] == pytest.approx([2.48, 0, 2])
+
+
+MU = Axis("mu", np.geomspace(1, 100, 21))
+B = Axis("b", np.linspace(0, 1, 21))
+
+
+def across(b: float, first: int = 0, last: int = 21) -> Points:
+    """A part of a line at this b, from one value of mu to another."""
+    return MU.values[first:last], np.full(last - first, b)
+
+
+def numbers(*lines: list[Points]) -> list[tuple[float, float, str]]:
+    """The numbers on boundaries of one reversal, two, and so on, of these parts."""
+    return list(places.words([Line("boundary", "", parts, f"{k}") for k, parts in enumerate(lines, 1)], MU, B))
+
+
+def test_a_number_is_in_the_middle_of_its_line() -> None:
+    assert numbers([across(0.3)]) == [(MU.values[10], 0.3, "1")]
+
+
+def test_numbers_of_close_lines_are_apart() -> None:
+    found = numbers(*([across(b)] for b in np.linspace(0.5, 0.51, 8)))
+    assert [count for *_, count in found] == list("12345678")
+    places = np.sort(np.log(np.array([mu for mu, *_ in found])) / np.log(100))
+    assert np.diff(places).min() > 0.06
+
+
+def test_small_parts_have_no_number_beside_large_ones() -> None:
+    island = across(0.8, 5, 8)
+    assert numbers([across(0.3), island, across(0.6)]) == [(MU.values[10], 0.3, "1"), (MU.values[10], 0.6, "1")]
+    assert numbers([island]) == [(MU.values[6], 0.8, "1")]
+
+
+def test_no_number_is_on_the_edge_of_a_map() -> None:
+    edge = (np.full(21, MU.edges[-1]), B.values)
+    assert [count for *_, count in numbers([edge], [across(0.3)])] == ["2"]
+
+
+def test_a_line_without_room_has_no_number() -> None:
+    assert [count for *_, count in numbers([across(0.3)], [across(0.3, 10, 12)])] == ["1"]
+
+
+def test_the_symbol_of_a_line_is_within_the_map_and_off_the_numbers() -> None:
+    far = Line("n_c1", "", [(MU.values, np.geomspace(0.2, 5, 21)), (np.full(2, np.nan), np.full(2, 0.5))], "n_c1")
+    boundary = Line("boundary", "", [across(0.44)], "1")
+    (count, *_), (mu, b, symbol) = places.words([boundary, far], MU, B)
+    assert symbol == "n_c1"
+    assert (mu, b) in zip(*far.parts[0], strict=True)
+    assert B.edges[0] + 0.03 < b < B.edges[-1] - 0.03
+    assert mu != count
+
+
+@pytest.mark.parametrize("width", [None, "85mm"])
+@pytest.mark.parametrize("over", ["b", "n0"])
+def test_nothing_that_is_written_on_a_map_lies_on_something_else(width: str | None, over: str) -> None:
+    one = made(n0=np.linspace(-0.1, 0.1, 21)).isel(b=0) if over == "n0" else made()
+    one = one.assign(margin_more=one.spin_final * 0 + 0.5, margin_fewer=one.spin_final * 0 + 0.5)
+    figure = picture.plot(one, width=width)
+    figure.draw_without_rendering()
+    for axes in (each for each in figure.axes if each.get_label() == ""):
+        boxes = {text.get_text(): text.get_window_extent() for text in axes.texts if text.get_weight() != "bold"}
+        assert sum("mathrm{c" in words for words in boxes) >= {"n0": 4, "b": 1}[over]
+        assert not any(Bbox.intersection(*pair) for pair in combinations(boxes.values(), 2))
+        for box in boxes.values():
+            assert axes.bbox.x0 < box.x0 < box.x1 < axes.bbox.x1
+            assert axes.bbox.y0 < box.y0 < box.y1 < axes.bbox.y1

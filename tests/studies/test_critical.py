@@ -9,6 +9,7 @@ import xarray as xr
 from support import Write, wide_bodies
 from support.cli import invoke
 from support.kernels import kernel
+from support.physics import IN_SI
 
 import sweep
 from sweep.config import ConfigError
@@ -147,28 +148,14 @@ def test_where_n_c2_is_undecided_its_upper_bound_is_told(write: Write) -> None:
     assert short.n_c2_plus_simulated_outer > 1.1 * long.n_c2_plus_simulated_outer
 
 
-STONE = """\
-units: SI
-body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
-friction: {mu: [30, 100]}
-start: {n0: 1, x0: 1.0e-3, y0: 1.0e-3}
-integrator: {t_end: 100}
-"""
+STONE = IN_SI | {
+    "friction": {"mu": 100}, "start": {"n0": 1, "x0": 1e-3, "y0": 1e-3}, "integrator": {"t_end": 100},
+}  # fmt: skip
 
 
-def test_critical_spins_of_a_real_body(write: Write) -> None:
-    result = sweep.critical(write(STONE), bracket=1e-2)
-    for side in ("plus", "minus"):
-        assert (result[f"n_c1_{side}_reason"] == 0).all()
-        assert np.abs(result[f"n_c2_{side}_simulated"] / result[f"n_c1_{side}_linear"])[1] > 1  # t_end decides
-        assert result[f"n_c1_{side}_linear"].attrs["units"] == "radian s-1"
-    assert "form_factor" not in result
-    assert "n_c1_plus" not in result
-
-
-def test_a_start_by_angles_has_no_spin_to_search(write: Write) -> None:
+def test_a_start_by_angles_has_no_spin_to_search() -> None:
     with pytest.raises(ConfigError, match="give x0 and y0"):
-        sweep.critical(write(STONE.replace("n0: 1, x0: 1.0e-3, y0: 1.0e-3", "roll: 1 deg")))
+        sweep.critical(STONE | {"start": {"roll": "1 deg"}})
 
 
 def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() -> None:
@@ -185,17 +172,17 @@ def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() ->
         np.testing.assert_allclose(general[name], papers[name], rtol=0, atol=1e-8)
 
 
-def test_a_small_body_reverses_as_a_large_one_does(write: Write) -> None:
+def test_a_small_body_reverses_as_a_large_one_does() -> None:
     """With lengths 400 times as small, times are 20 times as short, and spins larger than 10 rad/s."""
-    small = (
-        "units: SI\n"
-        "body: {a: 5.0e-4, b: 7.5e-5, c: 5.0e-5, offset: 2.5e-5, mass: 1.0, Ixx: 1.25e-9, Iyy: 1.0e-8,"
-        " Izz: 1.0625e-8, Ixy: -1.25e-10}\n"
-        "friction: {mu: 2000}\nstart: {n0: 1, x0: 2.5e-6, y0: 2.5e-6}\nintegrator: {t_end: 5}\n"
-    )
-    large = sweep.critical(write(STONE.replace("[30, 100]", "100")), bracket=1e-2)
-    found = sweep.critical(write(small), bracket=1e-2)
+    body = {name: value / (400**2 if name[0] == "I" else 400) for name, value in IN_SI["body"].items()} | {"mass": 1.0}
+    start, more = {"n0": 1, "x0": 2.5e-6, "y0": 2.5e-6}, {"friction": {"mu": 2000}, "integrator": {"t_end": 5}}
+    small = IN_SI | {"body": body, "start": start} | more
+    large, found = (sweep.critical(scene, bracket=1e-2) for scene in (STONE, small))
+    assert not {"form_factor", "n_c1_plus"} & set(large)
     for side in ("plus", "minus"):
+        assert large[f"n_c1_{side}_reason"] == 0
+        assert np.abs(large[f"n_c2_{side}_simulated"] / large[f"n_c1_{side}_linear"]) > 1  # t_end decides
+        assert large[f"n_c1_{side}_linear"].attrs["units"] == "radian s-1"
         there, here = (each[f"n_c2_{side}_simulated"] for each in (large, found))
         assert (found[f"n_c2_{side}_reason"] == large[f"n_c2_{side}_reason"]).all()
         np.testing.assert_allclose(here, 20 * there, rtol=0.01)

@@ -20,31 +20,18 @@ def table(header: str, *columns: np.ndarray, mark: str = ",") -> str:
     return "\n".join([header, *rows, ""])
 
 
-@pytest.mark.parametrize(
-    ("header", "mark", "unit"),
-    [
-        ("t,spin", ",", 1.0),
-        ('"Time (s)","Gyroscope x (rad/s)","Gyroscope z (rad/s)"', ",", 1.0),
-        ("time (ms);omega_z [deg/s]", ";", np.pi / 180),
-        ("Time (min)\tspin (rpm)", "\t", np.pi / 30),
-    ],
-)
-def test_spins_come_in_their_units(write: Write, header: str, mark: str, unit: float) -> None:
-    clock = 1e3 if "(ms)" in header else 1 / 60 if "(min)" in header else 1.0
-    between = [np.zeros(20)] if "Gyroscope x" in header else []
-    found = film.read(write(table(header, 5 + TIMES * clock, *between, SPINS / unit, mark=mark), "film.csv"))
-    np.testing.assert_allclose(found.time, TIMES, atol=1e-12)
-    np.testing.assert_allclose(found.value, SPINS, rtol=1e-12)
-    assert found.error is None
-    assert found.what == ("spin" if "spin" in header else "gyroscope")
-
-
 TIME, UP = TIMES + 3, SPINS - 2
 
 
 @pytest.mark.parametrize(
     ("name", "header", "columns"),
     [
+        ("film.csv", "t,spin", [TIME, UP]),
+        ("film.csv", "time (ms);omega_z [deg/s]", [1e3 * TIME, np.degrees(UP)]),
+        ("film.csv", "Time (min)\tspin (rpm)", [TIME / 60, UP * 30 / np.pi]),
+        ("film.csv", "time,spin,note\nms,deg/s,", [1e3 * TIME, np.degrees(UP), SPINS]),
+        ("film.csv", "time,spin,note\n[ms],(°/s),", [1e3 * TIME, np.degrees(UP), SPINS]),
+        ("film.csv", "time,spin (deg/s),note\nms,,", [1e3 * TIME, np.degrees(UP), SPINS]),
         ("phyphox.csv", '"Time (s)","Gyroscope x (rad/s)","Gyroscope z (rad/s)"', [TIME, SPINS, UP]),
         ("phyphox.csv", '"Zeit (s)","Gyroskop X (rad/s)","Gyroskop Z (rad/s)","Betrag (rad/s)"', [TIME, SPINS, UP, UP]),
         ("phyphox.csv", '"Czas (s)","Żyroskop - składowa z (rad/s)"', [TIME, UP]),
@@ -54,12 +41,15 @@ TIME, UP = TIMES + 3, SPINS - 2
         ("tracker.csv", "t,x,y,ω (rad/s)", [TIME, SPINS, SPINS, UP]),
     ],
 )  # fmt: skip
-def test_columns_of_phones_and_trackers_are_known(
-    write: Write, name: str, header: str, columns: list[np.ndarray]
+@pytest.mark.parametrize("minus", ["-", "−"])
+def test_columns_of_phones_and_trackers_are_known_with_their_units(
+    write: Write, name: str, header: str, columns: list[np.ndarray], minus: str
 ) -> None:
-    found = film.read(write(table(header, *columns), name))
+    (mark,) = {each for each in ",;\t" if each in header}
+    found = film.read(write(header + table("", *columns, mark=mark).replace("-", minus), name))
     np.testing.assert_allclose([found.time, found.value], [TIMES, UP], rtol=1e-12, atol=1e-12)
-    assert found.what == ("spin" if "ω" in header else "gyroscope")
+    assert found.what == ("spin" if "spin" in header or "ω" in header else "gyroscope")
+    assert (found.left_out, found.clock == "ms", found.error) == (0, "ms" in header, None)
 
 
 @pytest.mark.parametrize(("mark", "comma"), [("\t", False), ("\t", True), (";", True), (",", False)])
@@ -99,21 +89,6 @@ def test_degrees_taken_for_radians_are_refused(write: Write) -> None:
         sweep.fit(write(STONE), path, ["mu"])
 
 
-@pytest.mark.parametrize(("time", "spin"), [("ms", "deg/s"), ("[ms]", "(°/s)"), ("ms", "")])
-def test_a_row_of_units_below_the_header_is_honoured(write: Write, time: str, spin: str) -> None:
-    header = f"time,spin{'' if spin else ' (deg/s)'},note\n{time},{spin},"
-    found = film.read(write(table(header, TIMES * 1e3, np.degrees(SPINS), SPINS), "film.csv"))
-    np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12, atol=1e-12)
-    assert (found.left_out, found.clock) == (0, "ms")
-
-
-def test_a_minus_sign_is_a_minus_sign(write: Write) -> None:
-    text = table("t,n", TIMES, SPINS - 0.5).replace("-", "−")
-    assert "−" in text
-    found = film.read(write(text, "film.csv"))
-    np.testing.assert_allclose(found.value, SPINS - 0.5, rtol=1e-12)
-
-
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 def test_a_film_may_come_from_a_spreadsheet(tmp_path: Path, encoding: str) -> None:
     (tmp_path / "film.txt").write_text(table("t\tn", TIMES, SPINS, mark="\t"), encoding=encoding)
@@ -127,14 +102,6 @@ def quoted(*spins: str) -> str:
 def test_quoted_decimal_commas_are_read_where_the_column_shows_that_they_are_decimal(write: Write) -> None:
     found = film.read(write(quoted("-1,442", "0,5", "3"), "film.csv"))
     np.testing.assert_array_equal(found.value[:3], [-1.442, 0.5, 3.0])
-
-
-@pytest.mark.parametrize("mark", [";", "\t"])
-def test_numbers_may_have_decimal_commas(write: Write, mark: str) -> None:
-    text = table("t;n", TIMES, SPINS, mark=";").replace(".", ",").replace(";", mark)
-    found = film.read(write(text, "film.csv"))
-    assert found.left_out == 0
-    np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12)
 
 
 def test_a_heading_is_unwrapped(write: Write) -> None:
@@ -221,11 +188,7 @@ def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
 @pytest.mark.parametrize(
     ("header", "clock", "words"),
     [
-        (
-            "t,n",
-            1e9,
-            "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its",
-        ),
+        ("t,n", 1e9, "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its"),
         ("t,n", 1e3, "name the unit in the header, such as 'time (ms)'"),
         ("t (s),n", 1e3, "the film lasts 1900, but trajectories 5; raise t_end, or cut the film"),
     ],

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from support import Write, newton, own
-from support.physics import KANE_LEVINSON
+from support.physics import IN_SI
 from support.runs import Heard
 
 import sweep
@@ -22,11 +22,10 @@ PAPERS = {
     "body": {"a": 10, "b": 3, "delta": 0.1}, "friction": {"mu": 20},
     "start": {"n0": 0.3, "x0": 1.0, "y0": -0.4},
 }  # fmt: skip
-STONE: dict[str, Any] = {
-    "units": "SI", "gravity": 9.81, "body": {n: v for n, v in KANE_LEVINSON.items() if n != "gravity"},
+STONE: dict[str, Any] = IN_SI | {
     "friction": {"mu": 5.0},
     "start": {"roll": 0.02, "pitch": -0.03, "omega1": 0.1, "omega2": -0.2, "omega3": -5, "slip1": 0.01, "slip2": 0.02},
-}  # fmt: skip
+}
 BOWL = {
     **STONE, "body": {"surface": "paraboloid", "a": 0.1, "b": 0.3, "c": 0.02, "offset": 0.005, "mass": 0.5,
                       "Ixx": 1e-4, "Iyy": 5e-4, "Izz": 5.5e-4, "Ixy": 3e-5},

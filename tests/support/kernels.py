@@ -18,7 +18,12 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import make_kernel
 from sweep.models import MODELS, find
+from sweep.models.ladder import slip
+from sweep.models.stiff.slip import form_of
 from sweep.models.theory import stability
+
+PAPER_FORM = form_of(slip.MODEL)
+"""The stiff form of the paper's equations."""
 
 
 def kernel(
