@@ -87,7 +87,7 @@ def test_the_package_loads_what_is_asked_for() -> None:
     program = """
 import sys, sweep
 assert dir(sweep) == sorted(sweep.__all__)
-for name, loaded in (("run", set()), ("load_config", {"numpy"}), ("predict", {"numpy", "xarray"})):
+for name, loaded in (("run", set()), ("load_config", {"numpy"}), ("plot", {"numpy", "xarray"})):
     getattr(sweep, name)
     assert {"numpy", "xarray"} & set(sys.modules) == loaded
 """
