@@ -8,6 +8,8 @@ smoothly.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from sweep.explorer import style
 from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import State
 from sweep.explorer.style import TILES
+from sweep.kernels.measures.reversals import Reversals
 from sweep.plots import labels, marks, places, theory
 from sweep.plots.description import Map, describe
 from sweep.plots.scales import Scale
@@ -42,6 +45,10 @@ class MapFigure:
 
     _look: tuple[Any, ...] = ()
     """Everything that bar, cuts and tooltips were last labelled for."""
+
+    _highest: Sequence[Map] = ()
+    """The map with the highest counts, whose colours counts keep while a slider moves: a new scale takes a third of a
+    second."""
 
     def __init__(self, source: Source, x: str, y: str) -> None:
         self._source, self.axes = source, (x, y)
@@ -85,9 +92,12 @@ class MapFigure:
         """Show the variable of a state, or the first variable of `other`; return its map and its colour scale."""
         if other is None:
             part, known = self._source.map(state.show, *self.axes, state.at), self._source.cell
+            scale = style.scale_of(part, state)
+            self._highest = [part] if part.name == Reversals.name else []
         else:
             part, known = describe(other, next(iter(map(str, other.data_vars))), *self.axes), other
-        scale = style.scale_of(part, state)
+            scale = style.scale_of(part, state, *self._highest)
+            self._highest = [max([*self._highest, part], key=lambda each: each.shown.max(initial=0))]
         logarithmic = style.is_logarithmic(scale)
         for image in self._images:
             image.visible = (image is self._images[1]) == logarithmic
@@ -112,9 +122,12 @@ class MapFigure:
         unit = labels.unit(known, part.name) if part.name in known else ""
         self.figure.title.text = labels.with_unit(labels.words(known, part.name), unit)
         look = (part.name, unit, part.flags, scale.ticks, style.mapping(scale))
-        if look != self._look:  # new models take a third of a second
+        if look != self._look:
             self._look = look
-            self._explain(part, scale, unit, mapper)
+            document = self.figure.document
+            # Bokeh looks through all models for each new one; if they are frozen once, which takes a third of a second.
+            with document.models.freeze() if document else nullcontext():
+                self._explain(part, scale, unit, mapper)
         return part, scale
 
     def _explain(self, part: Map, scale: Scale, unit: str, mapper: Any) -> None:

@@ -83,14 +83,14 @@ def mapping(scale: Scale) -> dict[str, Any]:
     return {"palette": [to_hex(colour) for colour in scale.rgba(at)], "low": low, "high": high}
 
 
-def scale_of(part: Map, state: State) -> Scale:
-    """The scale of a map, with the visitor's choices; all values of flags have colours."""
+def scale_of(part: Map, state: State, *others: Map) -> Scale:
+    """The scale of a map, with the visitor's choices; all values of flags, and of `others`, have colours."""
     palette = state.palette or None
     if part.flags:
         return scales.flags(part.flags, palette)
     shown = part.shown[np.isfinite(part.shown)].astype(float)
     if not state.limits or not shown.size:
-        return common_scale([part], cmap=palette)
+        return common_scale([part, *others], cmap=palette)
     low, high = state.limits.get("low", shown.min()), state.limits.get("high", shown.max())
     possible = low < high and (low > 0 or part.name != "ratio")
     return common_scale([part], (low, high) if possible else None, palette)

@@ -114,8 +114,7 @@ class View:
             controls.on(self._shown.probe, "data", lambda _: self._point())
             controls.on(self._shown.request, "data", lambda _: self._requested())
         self._counts = counts = self._other.curve if self._other else None
-        with self._document.models.freeze():  # else Bokeh looks through all models for each new one
-            self._legend.text = page.legend(*self._shown.show(self.state, counts.dataset if counts else None))
+        self._legend.text = page.legend(*self._shown.show(self.state, counts.dataset if counts else None))
         self._controls.show(self.state)
         self._body.show(self.state)
 

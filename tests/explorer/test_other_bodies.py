@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.explorer import bodies, state
+from sweep.explorer import bodies, figure, state
 from sweep.explorer.bodies import COUNT
 from sweep.explorer.setup import Setup, usable
 from sweep.explorer.slices import Source
@@ -51,6 +51,19 @@ def test_a_value_stands_for_those_beside_it_on_a_long_axis() -> None:
     assert values.shape == last.dataset[COUNT].shape == (130,)
     np.testing.assert_array_equal(values[1::3], values[:-1:3])
     assert np.unique(values).size > 1
+
+
+def test_counts_keep_their_colours_while_a_slider_moves() -> None:
+    """A new scale, for higher counts, is a new bar, for which Bokeh looks through all models."""
+    source, setup = a_source()
+    first = state.first(source)
+    shown, scales = figure.MapFigure(source, first.x, first.y), []
+    for changed in ({}, {"delta": 0.06}, {"delta": 0.02}, {}):
+        there = replace(first, changed=changed)
+        counts = next(bodies.counts(setup, source, there)) if changed else None
+        scales.append(shown.show(there, counts.dataset if counts else None)[1].ticks)
+    own, higher, lower, again = scales
+    assert higher == lower != own == again
 
 
 def test_what_can_be_changed() -> None:
