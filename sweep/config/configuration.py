@@ -94,7 +94,7 @@ class Config:
     """The document it was made from, so that single values can be replaced; None in a copy with other values."""
 
     def __repr__(self) -> str:
-        return f"<Config {self.name}>\n{self.to_yaml()}"
+        return f"<Config {self.name}>\n{self.label()}"
 
     def _repr_html_(self) -> str:
         """Return the table that a notebook shows: parameters, values, meanings and units."""
@@ -237,9 +237,9 @@ class Config:
         return _yaml(self.document())
 
     def label(self) -> str:
-        """Return the text of the configuration for a dataset, whose coordinates hold the columns of a table of cases.
+        """Return the configuration as YAML, without the columns of a table of cases that it gives itself.
 
-        A long table would take half a minute to write and to read as YAML.
+        A dataset has them as coordinates, and a long table would take half a minute to write and to read as YAML.
         """
         found = self.document()
         if isinstance(found.get("cases"), dict):

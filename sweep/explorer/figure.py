@@ -125,7 +125,7 @@ class MapFigure:
         if look != self._look:
             self._look = look
             document = self.figure.document
-            # Bokeh looks through all models for each new one; if they are frozen once, which takes a third of a second.
+            # Bokeh looks through all models, in a third of a second, for each new one; frozen, it does so once.
             with document.models.freeze() if document else nullcontext():
                 self._explain(part, scale, unit, mapper)
         return part, scale

@@ -141,8 +141,8 @@ def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
         raise fault_of(odd)
     for d in dims:
         if dataset[d].dtype.kind not in "fiub" or not np.isfinite(dataset[d].values).all():
-            way_out = "xarray draws names: dataset[NAME].to_series().plot.bar()"
-            way_out = way_out if dataset[d].dtype.kind in "UO" else "give it numbers"
+            names = dataset[d].dtype.kind in "UO"
+            way_out = "xarray draws names: dataset[NAME].to_series().plot.bar()" if names else "give it numbers"
             raise fault_of(f"the values of the axis {d} are not finite numbers; {way_out}")
 
 

@@ -292,6 +292,7 @@ def make_exchange(model: Model):
         first, last = 0 if sizes[0] > 0.0 else _FIRST - 1, _SECOND if sizes[1] > 0.0 else _FIRST
         last = last if sizes[0] == 0.0 or sizes[1] == 0.0 else _POINTS
         x, slopes = np.zeros((7, _POINTS)), np.empty((7, _POINTS))
+        drag = slowed(n, p) if couples else 0.0
         powers = np.ones((4, 2))
         for k in range(3):
             for m in range(2):
@@ -305,8 +306,7 @@ def make_exchange(model: Model):
         for i in range(first, last):
             rates, _ = rhs((x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] - n, x[5, i], x[6, i]), p)
             slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], slopes[4, i], slopes[5, i], slopes[6, i] = rates
-            if couples:
-                slopes[4, i] -= slowed(n, p)
+            slopes[4, i] -= drag
         share, sums = 1.0 / (last - first), np.zeros(2 * len(THIRD))
         _clear(odd)
         _resolve(slopes[4], _EVEN_TURNS, first, last, sums)

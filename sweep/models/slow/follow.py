@@ -166,9 +166,10 @@ def follow(a1, a2, n, table, bent, d, reach, size):
         new = n - beats.real
         count, old = count + (new * old < 0.0), new
         turn1, turn2, cross = abs(g1) * f1, abs(g2) * f2, 2.0 * abs(g12) * np.sqrt(f1 * f2)
-        left = 0.5 * turn1 / abs(r1) + 0.5 * turn2 / abs(r2) + cross / abs(rate1 + np.conj(rate2))
+        beating = cross / abs(rate1 + np.conj(rate2))
+        left = 0.5 * turn1 / abs(r1) + 0.5 * turn2 / abs(r2) + beating
         lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
-        if r1 < 0.0 and r2 < 0.0 and others + cross / abs(rate1 + np.conj(rate2)) < _OVER * lasting:
+        if r1 < 0.0 and r2 < 0.0 and others + beating < _OVER * lasting:
             return count, True
         way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(abs(g1), abs(g2), _TINY))
         step = min(_until(way, turn1, r1), _until(way, turn2, r2))
