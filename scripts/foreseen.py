@@ -60,8 +60,9 @@ def say(words: str, found: xr.Dataset, where: Any) -> None:
         off = np.abs(found[name].values[where] - counts)
         shares[name] = f"right {np.mean(off == 0):.1%}, within one {np.mean(off <= 1):.1%}"
     right = found["reversals_foreseen"].values[where][sure] == counts[sure]
+    formula = shares.get("reversals_predicted", "not for these")
     print(
-        f"{words}: {where.sum()} cells, {shares['reversals_foreseen']} (formula {shares.get('reversals_predicted')}); "
+        f"{words}: {where.sum()} cells, {shares['reversals_foreseen']} (formula: {formula}); "
         f"sure {np.mean(sure):.1%}, right {np.mean(right):.2%}"
     )
 
