@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from functools import partial
@@ -38,6 +39,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Several processes share the cores; what a test says of threads, it sets.
 if "PYTEST_XDIST_WORKER" in os.environ:
     numba.set_num_threads(1)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Hide what the extra `browser` installs from the tests that have to pass without it."""
+    if "not browser" in config.option.markexpr:
+        sys.modules.update(dict.fromkeys(["bokeh", "playwright"]))
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:

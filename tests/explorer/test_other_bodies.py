@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sweep
-from sweep.explorer import bodies, figure, state
+from sweep.explorer import bodies, state
 from sweep.explorer.bodies import COUNT
 from sweep.explorer.setup import Setup, usable
 from sweep.explorer.slices import Source
@@ -53,8 +53,11 @@ def test_a_value_stands_for_those_beside_it_on_a_long_axis() -> None:
     assert np.unique(values).size > 1
 
 
+@pytest.mark.browser
 def test_counts_keep_their_colours_while_a_slider_moves() -> None:
     """A new scale, for higher counts, is a new bar, for which Bokeh looks through all models."""
+    from sweep.explorer import figure
+
     source, setup = a_source()
     first = state.first(source)
     shown, scales = figure.MapFigure(source, first.x, first.y), []
