@@ -26,17 +26,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.jit import called
+from sweep.jit import called, inline
 from sweep.models.model import Model
 from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory.linear import NODES
 
 # Products of a_1, a_2, a_1*, a_2*, by their exponents.
 SECOND = np.array([(2, 0, 0, 0), (1, 1, 0, 0), (0, 2, 0, 0)])
-THIRD = np.array([(2, 0, 1, 0), (1, 1, 0, 1), (1, 1, 1, 0), (0, 2, 0, 1), (2, 0, 0, 1), (0, 2, 1, 0),
+THIRD = np.array([(2, 0, 1, 0), (2, 0, 0, 1), (1, 1, 1, 0), (1, 1, 0, 1), (0, 2, 1, 0), (0, 2, 0, 1),
                   (3, 0, 0, 0), (2, 1, 0, 0), (1, 2, 0, 0), (0, 3, 0, 0)])  # fmt: skip
 RESONANT = 6
 """The first ones of `THIRD` turn as a_1 or a_2 do where the frequencies meet: they are the terms of T."""
+
+# How far apart in `THIRD` resonant products stand that act on each other by a' = C a; the others act on the next.
+_APART = 2
 
 LOWEST, HIGHER, TERMS = 7, 19, 25
 """The coefficients: C in rows, H_11, H_22 and H_12; then T in rows; then Q, of |a_1|⁴, |a_1 a_2|², |a_2|⁴,
@@ -46,7 +49,7 @@ LOWEST, HIGHER, TERMS = 7, 19, 25
 _THREE = 3
 
 # Harmonics (of the first phase, of the second) of the products of third order, and of the spin's change.
-_ODD = np.array([(1, 0), (1, 0), (0, 1), (0, 1), (2, -1), (-1, 2), (3, 0), (2, 1), (1, 2), (0, 3)])
+_ODD = np.array([(1, 0), (2, -1), (0, 1), (1, 0), (-1, 2), (0, 1), (3, 0), (2, 1), (1, 2), (0, 3)])
 _EVEN = np.array([(0, 0), (1, -1), (2, -2), (2, 0), (1, 1), (0, 2)])
 
 # Phases of both modes on a torus, in eighths of a turn.  The second mode needs only half a turn, because the equations
@@ -101,6 +104,18 @@ _SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ _F
 """Takes values at `NODES` to the derivative there of the polynomial through them."""
 
 
+@inline
+def square(z):
+    """|z|², without the root that abs takes."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@inline
+def quotient(a, b):
+    """a/b, without the checks of a complex division."""
+    return a * np.conj(b) * (1.0 / square(b))
+
+
 @called
 def _clear(matrix):
     """Set a matrix to zero.  Loops compile in a fifth of the time that Numba takes for expressions of arrays."""
@@ -112,8 +127,9 @@ def _clear(matrix):
 @called
 def _add(size, m, first, last, series):
     """Add the real part of `size` times a product of unit amplitudes to a series over points."""
-    for i in range(first, last):
-        series[i] += size.real * _COS[m, i] - size.imag * _SIN[m, i]
+    part, cos, sin = series[first:last], _COS[m, first:last], _SIN[m, first:last]
+    for i in range(len(part)):  # a loop that begins at `first` is not vectorised
+        part[i] += size.real * cos[i] - size.imag * sin[i]
 
 
 @called
@@ -138,23 +154,24 @@ def _product(A, B, result):
 
 
 @called
-def _solve(M, x, least):
+def _solve(M, x, band, least):
     """Solve M x = b by elimination without pivots; b is in `x`, and both are overwritten.
 
-    Where a pivot is smaller than `least`, it is made as large.
+    Elements farther from the diagonal than `band` are 0.  Where a pivot is smaller than `least`, it is made as large.
     """
     for k in range(len(x)):
         pivot = M[k, k] if abs(M[k, k]) > least else least * M[k, k] / abs(M[k, k])
-        for i in range(k + 1, len(x)):
-            share = M[i, k] / pivot
-            for j in range(k + 1, len(x)):
-                M[i, j] -= share * M[k, j]
+        M[k, k], last = pivot, min(k + 1 + band, len(x))
+        row = M[k, k + 1 : last]
+        for i in range(k + 1, last):
+            share, other = quotient(M[i, k], pivot), M[i, k + 1 : last]
+            for j in range(len(row)):
+                other[j] -= share * row[j]
             x[i] -= share * x[k]
-        M[k, k] = pivot
     for k in range(len(x) - 1, -1, -1):
-        for j in range(k + 1, len(x)):
+        for j in range(k + 1, min(k + 1 + band, len(x))):
             x[k] -= M[k, j] * x[j]
-        x[k] /= M[k, k]
+        x[k] = quotient(x[k], M[k, k])
 
 
 @called
@@ -190,7 +207,7 @@ def _follow_modes(A, Y, C):
             _minus(A[2:, 2:], C[j, j], M)
             for i in range(4):
                 x[i] = Y[i, 1 - j] * C[1 - j, j] - A[i + 2, j]
-            _solve(M, x, 0.0)
+            _solve(M, x, 3, 0.0)
             for i in range(4):
                 left += abs(x[i].real - Y[i, j].real) + abs(x[i].imag - Y[i, j].imag)
                 Y[i, j] = x[i]
@@ -204,7 +221,7 @@ def _solve_ripple(g, C, q):
     for i in range(3):
         for j in range(3):
             turned[i, j] = D[j, i]
-    _solve(turned, g, 0.0)
+    _solve(turned, g, 2, 0.0)
     for i in range(3):
         q[i] = g[i]
 
@@ -226,35 +243,34 @@ def _solve_third(A, C, Y, f, w):
     _fill(rest, D[:RESONANT, :RESONANT], M)
     for m in range(RESONANT):
         for i in range(4):
-            x[i * RESONANT + m] = Y[i, 0] * f[0, m] + Y[i, 1] * f[1, m] - f[i + 2, m]
+            x[4 * m + i] = Y[i, 0] * f[0, m] + Y[i, 1] * f[1, m] - f[i + 2, m]
     least = _NEAR * abs(A[1, 1])
-    _solve(M, x, least)
+    _solve(M, x, 4 * _APART, least)
     _clear(w)
     for m in range(RESONANT):
         for i in range(4):
-            w[i + 2, m] = x[i * RESONANT + m]
+            w[i + 2, m] = x[4 * m + i]
     _fill(A, D[RESONANT:, RESONANT:], M)
-    others = count - RESONANT
-    for i in range(6):
-        for m in range(others):
-            x[i * others + m] = -f[i, RESONANT + m]
-    _solve(M, x, least)
-    for i in range(6):
-        for m in range(others):
-            w[i, RESONANT + m] = x[i * others + m]
+    for m in range(count - RESONANT):
+        for i in range(6):
+            x[6 * m + i] = -f[i, RESONANT + m]
+    _solve(M, x, 6, least)
+    for m in range(count - RESONANT):
+        for i in range(6):
+            w[i, RESONANT + m] = x[6 * m + i]
 
 
 @called
 def _fill(A, D, M):
-    """The matrix of w -> A w - w D, for w in rows."""
-    width = len(D)
+    """The matrix of w -> A w - w D, for w in columns."""
+    height = len(A)
     _clear(M)
-    for i in range(len(A)):
-        for m in range(width):
-            for k in range(len(A)):
-                M[i * width + m, k * width + m] += A[i, k]
-            for k in range(width):
-                M[i * width + m, i * width + k] -= D[k, m]
+    for m in range(len(D)):
+        for i in range(height):
+            for k in range(height):
+                M[height * m + i, height * m + k] += A[i, k]
+            for k in range(len(D)):
+                M[height * m + i, height * k + i] -= D[k, m]
 
 
 def make_exchange(model: Model):
@@ -352,14 +368,15 @@ def make_exchange(model: Model):
         harmonics((0.0, size), n, p, shape, inverse, q, odd, even)
         sums[21] = -(even[0] + sums[5] * square) / square**2
         for k in modes:
-            found[k, 3] = (odd[k, 3] - size * linear[k, 1]) / cube
+            found[k, 5] = (odd[k, 5] - size * linear[k, 1]) / cube
         size, cube, square = np.sqrt(0.5) * size, np.sqrt(0.125) * cube, 0.5 * square
         harmonics((size, size), n, p, shape, inverse, q, odd, even)
         for k in modes:
-            found[k, 1] = (odd[k, 0] - size * linear[k, 0]) / cube - found[k, 0]
-            found[k, 2] = (odd[k, 3] - size * linear[k, 1]) / cube - found[k, 3]
-            for m in range(4, odd.shape[1]):
+            first, second = found[k, 0], found[k, 5]
+            for m in range(odd.shape[1]):
                 found[k, m] = odd[k, m] / cube
+            found[k, 0], found[k, 3] = first, found[k, 3] - size * linear[k, 0] / cube - first
+            found[k, 5], found[k, 2] = second, found[k, 2] - size * linear[k, 1] / cube - second
         sums[20] = -(even[0] + (sums[4] + sums[5]) * square) / square**2 - sums[19] - sums[21]
         beats, sums[24] = -(even[1] + sums[6] * square) / square**2, -even[2] / square**2
         harmonics((np.sqrt(1.6) * size, np.sqrt(0.4) * size), n, p, shape, inverse, q, odd, even)
