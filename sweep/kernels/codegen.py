@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sweep.jit import compiled, full_width
-from sweep.kernels.layout import LANES, Layout, constants_of
+from sweep.kernels.layout import Layout, constants_of
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Model
 
@@ -26,6 +25,12 @@ def make_gather(arguments: str, places: Iterable[str], record=None):
     """Compiled (arguments) -> the values of the expressions `places`, as a tuple or as the `NamedTuple` `record`."""
     made = f"{'record' if record else ''}{tuple_of(places)}"
     return compile_inline("load", arguments, [f"return {made}"], {"record": record})
+
+
+def make_scatter(arguments: str, places: Iterable[str]):
+    """Compiled (arguments, values) -> None: sets the expressions `places`."""
+    lines = [f"{place} = values[{i}]" for i, place in enumerate(places)]
+    return compile_inline("store", f"{arguments}, values", lines, {})
 
 
 def make_store(names: Sequence[str], layout: Layout):
@@ -71,13 +76,3 @@ def _joined(name: str, arguments: str, functions: Sequence[Any], operator: str, 
     calls = operator.join(f"f{i}({arguments})" for i in range(len(functions))) or without
     names = {f"f{i}": function for i, function in enumerate(functions)}
     return compile_inline(name, arguments, [f"return {calls}"], names)
-
-
-def compile_lanes(name: str, arguments: str, lines: Iterable[str], names: dict[str, Any]):
-    """Compiled (arguments) -> None: runs `lines` for each lane.
-
-    The lines form the body of the loop itself.  In a separate function, LLVM would unroll the loop over
-    lanes before inlining it, and nothing would be vectorised.
-    """
-    loop = ["full_width()", f"for lane in range({LANES}):", *(f"    {line}" for line in lines)]
-    return compiled(compile_inline(name, arguments, loop, names | {"full_width": full_width()}))

@@ -151,12 +151,12 @@ def specialised(function: Callable[..., Any], **arguments: Any):
     Parameters
     ----------
     arguments : for each argument of `function` in their order: None for a number, a count for a tuple of numbers, a
-        `NamedTuple` class for one of those, and `Constants` for p, the last
+        `NamedTuple` class for one of those, and `Constants` for p, the last, if it takes any
 
     If compilation by Numba is disabled, return `function` itself, in which a debugger can stop.
     """
     if INTERPRETED:
-        return _interpreted(function, arguments["p"])
+        return _interpreted(function, arguments["p"]) if "p" in arguments else function
     trace = Trace()
     result = function(*(_argument(trace, name, kind) for name, kind in arguments.items()))
     flat: list[Any] = []

@@ -9,8 +9,7 @@ from support.kernels import PAPER_FORM, finish, images, run, spin, threads
 from support.kernels import kernel as make
 
 from sweep.kernels.adams import start_up
-from sweep.kernels.adams.step import HISTORY, names
-from sweep.kernels.codegen import compile_lanes
+from sweep.kernels.adams.step import HISTORY
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES, PACK
 from sweep.kernels.methods import METHODS, automatic_step
@@ -176,9 +175,8 @@ def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> 
 
 @pytest.mark.x86
 def test_the_loop_over_lanes_of_start_up_is_vector_instructions() -> None:
-    lines = start_up._advance(PAPER_FORM, start_up._places(PAPER_FORM))
-    advance = compile_lanes("advance", "group, points, ticks", lines, names(PAPER_FORM))
     group = np.zeros(len(start_up.layout(PAPER_FORM).names) * LANES)
-    found = assembly(advance, group, np.zeros((HISTORY + 1) * start_up._POINT_SIZE), 1.0)
+    points = np.zeros((HISTORY + 1) * start_up._POINT_SIZE)
+    found = assembly(start_up._make_advance(PAPER_FORM), group, points, 1.0)
     assert found.count("divpd") >= 3
     assert found.count("sqrtpd") >= 2

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.jit import Cached, compiled, full_width
+from sweep.jit import Cached, compiled, full_width, inline, nothing
 from sweep.kernels.adams import start_up, stretches, weights
 from sweep.kernels.adams.start_up import count_levels, duration
 from sweep.kernels.adams.step import (
@@ -31,18 +31,18 @@ from sweep.kernels.adams.step import (
     POINT,
     PREDICT,
     PREDICTOR_NODES,
-    WORK_RULE,
-    advance_lines,
-    load_lines,
-    names,
-    places,
+    make_accept,
+    make_advance,
+    make_formulas,
+    make_history,
+    work_of,
 )
+from sweep.kernels.codegen import make_access
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, PACK, Table
 from sweep.kernels.measures.measurement import WORK, Stretch
 from sweep.kernels.method import Method, Tolerance
 from sweep.kernels.status import DIVERGED, RUNNING
-from sweep.models.generated import compile_inline
 from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.models.stiff.form import StiffForm, velocities
 from sweep.models.stiff.modes import bending
@@ -151,55 +151,68 @@ class Adams(Stepper):
         stretches.carry(self.form, kernel, images, self.tolerance)
 
     def make_run_block(self, kernel: Kernel):
-        """Compiled (group) -> None: takes `BLOCK` steps of all lanes.
+        """Compiled (group, packs) -> None: takes `BLOCK` steps of all lanes.
 
         Each step appends a point to a history that begins with the eight points of the image.  So a single step
         is compiled, rather than one for each place in a ring of eight.  The history is not part of the group: LLVM then
         recognises that writes to one cannot affect reads from the other.
         """
-        known = names(self.form) | {"watch": kernel.make_watch(), "full_width": full_width(), "np": np}
-        first, size = kernel.layout.at(_HISTORY[0]), len(POINT) * LANES
-        lines = [
-            "full_width()",
-            f"history = np.empty({(HISTORY + BLOCK) * size})",
-            f"for i in range({HISTORY * size}):",
-            f"    history[i] = group[{first} + i]",
-            f"for oldest in range(0, {BLOCK * size}, {size}):",
-            f"    for lane in range({PACK} * packs):",
-            *(f"        {line}" for line in self._step_lines(kernel)),
-            f"for i in range({HISTORY * size}):",
-            f"    group[{first} + i] = history[{BLOCK * size} + i]",
-        ]
-        return compiled(compile_inline("run_block", "group, packs", lines, known))
+        layout, size = kernel.layout, len(POINT) * LANES
+        load_states, load_constants, _ = make_access(self.model, layout)
+        load_points, append = make_history(size)
+        load_formulas = make_formulas("group, lane", lambda name: f"group[{layout.at(name)} + lane]")
+        advance, accept = make_advance(self.form), make_accept(self.form, layout)
+        work_done, watch, wide = _make_work(kernel), kernel.make_watch(), full_width()
+        FIRST, BEGIN, STEP, GOAL = map(layout.at, (_HISTORY[0], "begin", "step", "goal"))
+        DONE, STATUS, SPIN = map(layout.at, ("done", "status", "spin"))
+        kept, block, pack, lanes = HISTORY * size, BLOCK * size, PACK, LANES
 
-    def _step_lines(self, kernel: Kernel) -> list[str]:
-        """The source of one step, from eight points of the history, of which the first is at `oldest`, to the ninth.
+        @compiled
+        def run_block(group, packs):
+            wide()
+            # With a known bound, LLVM sees that no lane counts from the end of an array, and vectorises the loop.
+            last, history = min(pack * packs, lanes), np.empty(kept + block)
+            for i in range(kept):
+                history[i] = group[FIRST + i]
+            for oldest in range(0, block, size):
+                for lane in range(last):
+                    y = load_states(group, lane)
+                    p = load_constants(group, lane)
+                    status, done, h, old = (
+                        group[STATUS + lane],
+                        group[DONE + lane],
+                        group[STEP + lane],
+                        group[SPIN + lane],
+                    )
+                    active = (status == RUNNING) & (done < group[GOAL + lane])
+                    points = load_points(history, oldest, lane)
+                    formulas = load_formulas(group, lane)
+                    new, slopes, spin, (num, den), power = advance(y, points, formulas, p)
+                    accepted = accept(group, lane, status, active, y, new, num, den)
+                    append(history, oldest + kept, lane, slopes + new[5:])
+                    old, group[DONE + lane] = group[SPIN + lane], done + (1.0 if accepted else 0.0)
+                    group[SPIN + lane] = spin if accepted else old
+                    work, now = work_done(group, lane, h, power), group[BEGIN + lane] + (done + 1.0) * h
+                    watch(group, lane, accepted, y, p, old, work, h, now)
+            for i in range(kept):
+                group[FIRST + i] = history[block + i]
 
-        The lines form the body of the loop itself.  In a separate function, LLVM would unroll the loop
-        over lanes before inlining it, and nothing would be vectorised.
-        """
-        points, work = places(POINT), ["work = 0.0"]
+        return run_block
 
-        def at(name: str) -> str:
-            if name in points:
-                return f"history[oldest + {points[name]} + lane]"
-            return f"group[{kernel.layout.at(name)} + lane]"
 
-        if WORK in kernel.follows:
-            powers = ", ".join(map(at, stretches.POWERS))
-            work = [f"p0, p1, p2 = {powers}", f"{powers} = power, p0, p1"]
-            work += [f"work = {WORK_RULE.format('power', 'p0', 'p1', 'p2')}"]
-        return [
-            *load_lines(self.form, at),
-            f"status, done, h, old = {at('status')}, {at('done')}, {at('step')}, {at('spin')}",
-            f"active = (status == {RUNNING}) & (done < {at('goal')})",
-            *advance_lines(self.form, at),
-            f"{at('done')} = done + (1.0 if accepted else 0.0)",
-            f"{at('spin')} = spin if accepted else old",
-            *work,
-            f"now = {at('begin')} + (done + 1.0) * h",
-            "watch(group, lane, accepted, y, p, old, work, h, now)",
-        ]
+def _make_work(kernel: Kernel):
+    """Inline (group, lane, h, power) -> the work of friction in a step, if a measurement needs it."""
+    if WORK not in kernel.follows:
+        return nothing
+    POWER0, POWER1, POWER2 = map(kernel.layout.at, stretches.POWERS)
+
+    @inline
+    def work_done(group, lane, h, power):
+        power1, power2, power3 = group[POWER0 + lane], group[POWER1 + lane], group[POWER2 + lane]
+        group[POWER0 + lane], group[POWER1 + lane], group[POWER2 + lane] = power, power1, power2
+        return work_of(h, power, power1, power2, power3)
+
+    return work_done
 
 
 # The error in spin at t = 400 is about n ρ θ⁶, within a factor of ten for most of 877 wide cells, where θ is the phase

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from sweep.jit import Cached, on_all_threads, serial
+from sweep.jit import Cached, compiled, full_width, on_all_threads, serial
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
     CORRECT,
@@ -22,17 +22,14 @@ from sweep.kernels.adams.step import (
     POINT,
     PREDICT,
     PREDICTOR_NODES,
-    SLIPS,
-    SLOPES,
-    WORK_RULE,
-    At,
-    advance_lines,
-    load_lines,
-    names,
-    places,
+    make_accept,
+    make_advance,
+    make_formulas,
+    make_history,
+    work_of,
 )
 from sweep.kernels.adams.weights import plain_weights
-from sweep.kernels.codegen import compile_lanes
+from sweep.kernels.codegen import make_access, make_scatter
 from sweep.kernels.layout import LANES, Layout, Table, constants_of
 from sweep.kernels.runge_kutta import make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
@@ -54,9 +51,8 @@ _SHARE, _DOPRI5_STEPS = 0.5, 224
 # 1e-10; without, the error is up to twelve times that of the method itself at h = 0.03.
 _LAYER_LEVELS, _EXTRA_STEPS = 2, 6
 
-# The quantities of a point of the history.
-_POINT = (*POINT, "power{}")
-_POINTS, _POINT_SIZE = places(_POINT), len(_POINT) * LANES
+# A point of the history has the power of friction after the quantities of `POINT`.
+_POWER, _POINT_SIZE = len(POINT) * LANES, (len(POINT) + 1) * LANES
 
 
 @cache
@@ -116,7 +112,7 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
         for begin in range(0, len(cells), LANES)
     ]
     kept, begins = layout(form), np.concatenate([starts, constants], axis=1)
-    ended, history = np.empty((len(step), len(kept.names))), np.empty((len(step), HISTORY, len(_POINT)))
+    ended, history = np.empty((len(step), len(kept.names))), np.empty((len(step), HISTORY, _POINT_SIZE // LANES))
 
     def take(cells: Array) -> None:
         """Take the cells of one group through start-up; empty lanes repeat the last cell."""
@@ -125,7 +121,7 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
         group[: begins.shape[1]] = begins[lanes].T
         group[kept.index("spacing")] = step[lanes] / 2.0 ** len(steps)
         group[kept.index("h")] = 0.5 * group[kept.index("spacing")]
-        points = np.zeros((HISTORY + steps.max(), len(_POINT), LANES))
+        points = np.zeros((HISTORY + steps.max(), _POINT_SIZE // LANES, LANES))
         run(group.ravel(), points.ravel(), steps)
         ended[cells] = group[:, : len(cells)].T
         history[cells] = np.moveaxis(points[:HISTORY, :, : len(cells)], -1, 0)
@@ -135,20 +131,6 @@ def start_up(form: StiffForm, step: Array, constants: Array, starts: Array, leve
     return Table(ended, kept), history
 
 
-def _places(form: StiffForm) -> At:
-    """The place where the loops below keep a quantity of one lane; point 0 of the history is the oldest."""
-    kept = layout(form)
-
-    def at(name: str) -> str:
-        if name in _POINTS:
-            return f"points[{_POINTS[name]} + lane]"
-        if name in _weights():
-            return f"({_weights()[name]!r} * h)"
-        return f"group[{kept.at(name)} + lane]"
-
-    return at
-
-
 @cache
 def _weights() -> dict[str, float]:
     """The plain weights, in steps; they take as long as the rest of this module to make."""
@@ -156,90 +138,133 @@ def _weights() -> dict[str, float]:
     return dict(zip((*PREDICT, *CORRECT, "gamma"), map(float, weights), strict=True))
 
 
-def _begin_step(form: StiffForm, at: At) -> list[str]:
-    return [
-        *load_lines(form, at),
-        f"h, status, work = {at('h')}, {at('status')}, {at('work')}",
-        f"active = status == {RUNNING}",
-    ]
+def _make_layer_step(form: StiffForm):
+    """Compiled (group) -> None: a step of dopri5 of all lanes."""
+    kept, full = layout(form), form.full
+    load, load_constants, store = make_access(form.model, kept)
+    step, lanes, wide = make_step(DOPRI5, full.rhs, len(full.states)), LANES, full_width()
+    H, STATUS, TICKS, WORK = map(kept.at, ("h", "status", "ticks", "work"))
+
+    @compiled
+    def layer_step(group):
+        wide()
+        for lane in range(lanes):
+            y, p, status = load(group, lane), load_constants(group, lane), group[STATUS + lane]
+            new, _, work, sound, airborne, jammed = step(y, p, group[H + lane])
+            active = status == RUNNING
+            accepted = active & sound
+            store(group, lane, accepted, new, y)
+            failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
+            group[STATUS + lane] = failure if active & (not sound) else status
+            group[TICKS + lane] += 0.5 if accepted else 0.0
+            group[WORK + lane] += work if accepted else 0.0
+
+    return layer_step
 
 
-def _end_step(at: At, ticks: str) -> list[str]:
-    return [f"{at('ticks')} += {ticks} if accepted else 0.0", f"{at('work')} = work + (done if accepted else 0.0)"]
+def _make_record(form: StiffForm):
+    """Compiled (group, points) -> None: makes the first point from states of the full model."""
+    load, load_constants, _ = make_access(form.model, layout(form))
+    _, put = make_history(_POINT_SIZE)
+    momentum, slow, newton, power = form.momentum, form.slow, form.newton, form.power
+    lanes, wide, power_at = LANES, full_width(), _POWER
+
+    @compiled
+    def record(group, points):
+        wide()
+        for lane in range(lanes):
+            p = load_constants(group, lane)
+            s = momentum(load(group, lane), p)
+            f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)
+            _, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, 0.0, 0.0, 0.0, p)
+            put(points, 0, lane, f + s[5:])
+            points[power_at + lane] = power(num / den, s[5], s[6], geometry, p)
+
+    return record
 
 
-def _dopri5(form: StiffForm, at: At) -> list[str]:
-    return [
-        *_begin_step(form, at),
-        "new, _, done, sound, airborne, jammed = step(y, p, h)",
-        "accepted = active & sound",
-        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(form.model.states)),
-        f"failure = {PARADOX} if jammed else ({LIFT_OFF} if airborne else {DIVERGED})",
-        f"{at('status')} = failure if active & (not sound) else status",
-        *_end_step(at, "0.5"),
-    ]
+def _make_replace(form: StiffForm):
+    """Compiled (group) -> None: replaces states of the full model by those of the stiff form."""
+    load, load_constants, store = make_access(form.model, layout(form))
+    momentum, lanes, wide = form.momentum, LANES, full_width()
+
+    @compiled
+    def replace(group):
+        wide()
+        for lane in range(lanes):
+            y = load(group, lane)
+            store(group, lane, True, momentum(y, load_constants(group, lane)), y)
+
+    return replace
 
 
-def _record(form: StiffForm, at: At) -> list[str]:
-    """Make point 0 of the history from a state of the full model."""
-    return [
-        *load_lines(form, at),
-        "s = momentum(y, p)",
-        "f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)",
-        "_, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, 0.0, 0.0, 0.0, p)",
-        *(f"{at(name.format(0))} = f[{i}]" for i, name in enumerate(SLOPES)),
-        *(f"{at(name.format(0))} = s[{5 + i}]" for i, name in enumerate(SLIPS)),
-        f"{at('power0')} = power(num / den, s[5], s[6], geometry, p)",
-    ]
+def _make_set_step(form: StiffForm):
+    """Compiled (group, ticks) -> None: sets the step, in units of the first spacing, and what depends on it."""
+    kept, rocking, weight = layout(form), form.rocking, _weights()[CORRECT[0]]
+    _, load_constants, _ = make_access(form.model, kept)
+    store = make_scatter("group, lane", [f"group[{kept.at(name)} + lane]" for name in MATRIX])
+    SPACING, H, PER_WEIGHT = map(kept.at, ("spacing", "h", "per_weight"))
+    lanes, wide = LANES, full_width()
+
+    @compiled
+    def set_step(group, ticks):
+        wide()
+        for lane in range(lanes):
+            h = ticks * group[SPACING + lane]
+            group[H + lane] = h
+            group[PER_WEIGHT + lane] = 1.0 / (weight * h)
+            store(group, lane, implicit(weight * h, rocking(load_constants(group, lane))))
+
+    return set_step
 
 
-def _replace(form: StiffForm, at: At) -> list[str]:
-    """Replace a state of the full model by the state of the stiff form."""
-    replaced = (f"{at(name)} = s[{i}]" for i, name in enumerate(form.model.states))
-    return [*load_lines(form, at), "s = momentum(y, p)", *replaced]
+def _make_advance(form: StiffForm):
+    """Compiled (group, points, ticks) -> None: a step from the first eight points to the ninth."""
+    kept, weights = layout(form), _weights()
 
+    def at(name: str) -> str:
+        return f"({weights[name]!r} * h)" if name in weights else f"group[{kept.at(name)} + lane]"
 
-def _set_step(form: StiffForm, at: At) -> list[str]:
-    return [
-        *load_lines(form, at),
-        f"h = ticks * {at('spacing')}",
-        f"{at('h')} = h",
-        f"{at('per_weight')} = 1.0 / {at('correct0')}",
-        f"matrix = implicit({at('correct0')}, rocking(p))",
-        *(f"{at(name)} = matrix[{i}]" for i, name in enumerate(MATRIX)),
-    ]
+    load, load_constants, _ = make_access(form.model, kept)
+    load_points, put = make_history(_POINT_SIZE)
+    load_formulas = make_formulas("group, lane, h", at)
+    advance_lane, accept = make_advance(form), make_accept(form, kept)
+    H, STATUS, TICKS, WORK = map(kept.at, ("h", "status", "ticks", "work"))
+    newest, newest_power, lanes, wide = HISTORY * _POINT_SIZE, HISTORY * _POINT_SIZE + _POWER, LANES, full_width()
+    size = _POINT_SIZE
 
+    @compiled
+    def advance(group, points, ticks):
+        wide()
+        for lane in range(lanes):
+            y, p, h = load(group, lane), load_constants(group, lane), group[H + lane]
+            status = group[STATUS + lane]
+            active = status == RUNNING
+            formulas = load_formulas(group, lane, h)
+            new, slopes, _, (num, den), power = advance_lane(y, load_points(points, 0, lane), formulas, p)
+            accepted = accept(group, lane, status, active, y, new, num, den)
+            put(points, newest, lane, slopes + new[5:])
+            last = newest_power + lane
+            points[last] = power
+            work = work_of(h, power, points[last - size], points[last - 2 * size], points[last - 3 * size])
+            group[TICKS + lane] += ticks if accepted else 0.0
+            group[WORK + lane] += work if accepted else 0.0
 
-def _advance(form: StiffForm, at: At) -> list[str]:
-    """Steps from points 0 … 7 to point 8."""
-    return [
-        *_begin_step(form, at),
-        *advance_lines(form, at),
-        f"{at('power8')} = power",
-        f"done = {WORK_RULE.format('power', at('power7'), at('power6'), at('power5'))}",
-        *_end_step(at, "ticks"),
-    ]
+    return advance
 
 
 @cache
 def compiled_start_up(form: StiffForm) -> Cached:
     """Compiled (group, points, steps) -> None: takes a group through all its levels."""
-    at = _places(form)
-    known = names(form) | {"slow": form.slow, "newton": form.newton, "power": form.power}
-    known |= {"momentum": form.momentum, "implicit": implicit, "rocking": form.rocking}
-    known["step"] = make_step(DOPRI5, form.full.rhs, len(form.model.states))
-    record = compile_lanes("record", "group, points", _record(form, at), known)
-    replace = compile_lanes("replace", "group", _replace(form, at), known)
-    dopri5 = compile_lanes("dopri5", "group", _dopri5(form, at), known)
-    set_step = compile_lanes("set_step", "group, ticks", _set_step(form, at), known)
-    advance = compile_lanes("advance", "group, points, ticks", _advance(form, at), known)
-    size, dopri5_steps = _POINT_SIZE, _DOPRI5_STEPS
+    layer_step, record, replace = _make_layer_step(form), _make_record(form), _make_replace(form)
+    set_step, advance = _make_set_step(form), _make_advance(form)
+    size, layer_steps = _POINT_SIZE, _DOPRI5_STEPS
 
     def run(group, points, steps):
-        for n in range(dopri5_steps + 1):
+        for n in range(layer_steps + 1):
             if n:
-                dopri5(group)
-            back = dopri5_steps - n
+                layer_step(group)
+            back = layer_steps - n
             if back % 2 == 0 and back < 2 * HISTORY:
                 record(group, points[(HISTORY - 1 - back // 2) * size :])
         replace(group)

@@ -1,19 +1,21 @@
 """One step of the stiff method, used both in its main loop and in its start-up.
 
-The arithmetic is in `solve`, an ordinary inline function, made for each model.  Only the sums over the history are
-generated as text, because the places of the points have to be known when the code is compiled.
+The sums over the history are written as loops, and traced into straight-line source; the rest are inline functions,
+made for each model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections import namedtuple
+from collections.abc import Callable
 
 from sweep.jit import inline
-from sweep.kernels.layout import LANES, constants_of
+from sweep.kernels.codegen import make_access, make_gather, make_scatter
+from sweep.kernels.layout import LANES, Layout
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models.generated import tuple_of
 from sweep.models.stiff.form import StiffForm
+from sweep.models.symbols import specialised
 
 HISTORY = 8
 PREDICTOR_NODES = tuple(-j for j in range(8))
@@ -35,22 +37,17 @@ SLIPS = tuple(f"v{{}}_{i}" for i in range(2))
 POINT = (*SLOPES, *SLIPS)
 """Quantities of a point of the history, to be formatted with its slot: the slopes of (u, M), and the slip."""
 
-WORK_RULE = "h / 24.0 * (9.0 * {} + 19.0 * {} - 5.0 * {} + {})"
-"""The work of friction in a step by the Adams-Moulton formula of order four, to be formatted with its power at four
-points, newest first."""
-
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
 """Names of the elements of P, the implicit part of the corrector (see `sweep.models.theory.rocking.implicit`)."""
 
-At = Callable[[str], str]
-"""A function that gives the place of a quantity of one lane: (name) -> an expression that can be read and assigned
-to."""
+Formulas = namedtuple("Formulas", "predict correct matrix per_weight gamma")
+"""The weights of a step: `PREDICT`, `CORRECT`, `MATRIX`, 1 over the weight of the new slope, and that of BDF5's."""
 
 
-def places(point: Sequence[str]) -> dict[str, int]:
-    """Where the lanes of each quantity begin in a history of nine points with the quantities `point`."""
-    filled = [name.format(slot) for slot in range(HISTORY + 1) for name in point]
-    return {name: i * LANES for i, name in enumerate(filled)}
+@inline
+def work_of(h, power0, power1, power2, power3):
+    """The work of friction in a step h by the Adams-Moulton formula of order four, from its power, newest first."""
+    return h / 24.0 * (9.0 * power0 + 19.0 * power1 - 5.0 * power2 + power3)
 
 
 @inline
@@ -106,45 +103,68 @@ def make_solve(form: StiffForm):
     return solve
 
 
-def names(form: StiffForm) -> dict[str, Any]:
-    """Bind the names in the generated lines."""
-    return {"solve": make_solve(form), "Constants": form.model.constants}
-
-
-def load_lines(form: StiffForm, at: At) -> list[str]:
-    """Lines that load the constants p and the states y."""
-    return [
-        f"p = Constants{tuple_of(map(at, constants_of(form.model)))}",
-        f"y = {tuple_of(map(at, form.model.states))}",
-    ]
-
-
-def advance_lines(form: StiffForm, at: At) -> list[str]:
-    """Lines that take a lane, if it is `active`, from the eight points of the history, slots 0 … 7, to the ninth.
-
-    They need the names that `load_lines` sets, and `status`.  They set `new`, slopes, `spin`, (num, den) and `power`,
-    as `solve` returns them, and `sound` and `accepted`.
-    """
-    lines = [f"q{i} = g{i} = y[{i}]" for i in range(5)]
-    lines += ["e0 = e1 = b0 = b1 = 0.0"]
-    for j, slot in enumerate(range(HISTORY)[::-1]):  # the newest first
-        lines += [f"wp, wc = {at(f'predict{j}')}, {at(f'correct{j + 1}')}"]
-        for i in range(5):
-            lines += [f"f = {at(SLOPES[i].format(slot))}", f"q{i} += wp * f", f"g{i} += wc * f"]
+def _sums(y, points, predict, correct):
+    """(q, g, e, b) for `solve`, from the states y and the points of the history, oldest first."""
+    q = g = y[: len(SLOPES)]
+    e = b = (0.0, 0.0)
+    for j in range(HISTORY):  # the newest first
+        begin = (HISTORY - 1 - j) * len(POINT)
+        slopes, slips = points[begin : begin + len(SLOPES)], points[begin + len(SLOPES) : begin + len(POINT)]
+        q = tuple(q[i] + predict[j] * slope for i, slope in enumerate(slopes))
+        g = tuple(g[i] + correct[j + 1] * slope for i, slope in enumerate(slopes))
         if j < len(BDF):
-            for i in range(2):
-                value = at(SLIPS[i].format(slot))
-                lines += [f"e{i} += {EXTRAPOLATE[j]!r} * {value}", f"b{i} += {BDF[j]!r} * {value}"]
-    weights = f"{at('correct0')}, {at('per_weight')}, {at('gamma')}, {tuple_of(map(at, MATRIX))}"
-    return [
-        *lines,
-        "q, g, e, b = (q0, q1, q2, q3, q4), (g0, g1, g2, g3, g4), (e0, e1), (b0, b1)",
-        f"new, slopes, spin, (num, den), power = solve(q, g, e, b, p, {weights})",
-        "sound = (num > 0.0) & (den > 0.0)",
-        "accepted = active & sound",
-        *(f"{at(name)} = new[{i}] if accepted else y[{i}]" for i, name in enumerate(form.model.states)),
-        f"failure = {PARADOX} if den <= 0.0 else ({LIFT_OFF} if num <= 0.0 else {DIVERGED})",
-        f"{at('status')} = failure if active & (not sound) else status",
-        *(f"{at(name.format(HISTORY))} = slopes[{i}]" for i, name in enumerate(SLOPES)),
-        *(f"{at(name.format(HISTORY))} = new[{5 + i}]" for i, name in enumerate(SLIPS)),
-    ]
+            e = tuple(e[i] + EXTRAPOLATE[j] * slip for i, slip in enumerate(slips))
+            b = tuple(b[i] + BDF[j] * slip for i, slip in enumerate(slips))
+    return q, g, e, b
+
+
+def make_advance(form: StiffForm):
+    """Inline (y, points, formulas, p) -> as `solve`: from the eight points of a history, one after another, to the
+    ninth."""
+    solve, nodes = make_solve(form), {"predict": len(PREDICTOR_NODES), "correct": len(CORRECTOR_NODES)}
+    sums = specialised(_sums, y=len(form.model.states), points=HISTORY * len(POINT), **nodes)
+
+    @inline
+    def advance(y, points, formulas, p):
+        q, g, e, b = sums(y, points, formulas.predict, formulas.correct)
+        per_weight, gamma = formulas.per_weight, formulas.gamma
+        return solve(q, g, e, b, p, formulas.correct[0], per_weight, gamma, formulas.matrix)
+
+    return advance
+
+
+def make_formulas(arguments: str, at: Callable[[str], str]):
+    """Compiled (arguments) -> `Formulas`, of which `at` gives the expression of a quantity by its name."""
+    weights = (tuple_of(map(at, names)) for names in (PREDICT, CORRECT, MATRIX))
+    return make_gather(arguments, [*weights, at("per_weight"), at("gamma")], Formulas)
+
+
+def make_history(size: int):
+    """The functions that read and extend a history, of which a point takes `size` numbers.
+
+    They are (history, first, lane) -> `POINT` of eight points in turn; and (history, at, lane, values) -> None, which
+    sets the `POINT` of one.
+    """
+    places = [f"history[first + {i * LANES + j * size} + lane]" for j in range(HISTORY) for i in range(len(POINT))]
+    return make_gather("history, first, lane", places), make_scatter("history, first, lane", places[: len(POINT)])
+
+
+def make_accept(form: StiffForm, layout: Layout):
+    """Inline (group, lane, status, active, y, new, num, den) -> accepted: keeps the new states of a sound step.
+
+    A lane that is not `active` stays as it is; so do the states, and the status says why, where numerator or
+    denominator of the normal force are not positive.
+    """
+    _, _, store = make_access(form.model, layout)
+    STATUS = layout.at("status")
+
+    @inline
+    def accept(group, lane, status, active, y, new, num, den):
+        sound = (num > 0.0) & (den > 0.0)
+        accepted = active & sound
+        store(group, lane, accepted, new, y)
+        failure = PARADOX if den <= 0.0 else (LIFT_OFF if num <= 0.0 else DIVERGED)
+        group[STATUS + lane] = failure if active & (not sound) else status
+        return accepted
+
+    return accept
