@@ -21,7 +21,7 @@ from sweep.config.document import plain_data
 from sweep.config.messages import explain
 from sweep.config.schema import Integrator
 from sweep.config.values import Values, in_si
-from sweep.faults import ConfigError, Fault
+from sweep.faults import ConfigError, Fault, fault_of
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
@@ -107,6 +107,8 @@ def _opened(
 
 def _source(config: ConfigLike) -> document.Document:
     """Return the document of a configuration as a copy that may be changed."""
+    if hasattr(config, "data_vars"):  # a dataset is a mapping too
+        raise fault_of("this is a dataset, not a configuration; it has methods, such as dataset.sweep.trajectory")
     if isinstance(config, Mapping):
         return document.Document("", plain_data(config))
     if not isinstance(config, Config):

@@ -186,7 +186,10 @@ def read(
                 faults.append(f"{key}={brief(text)}: {fault}")
     if len(asked) > MAX_CELLS:
         faults.append(f"{len(asked)} cells are too many; the first {MAX_CELLS} are drawn")
-    changed = {n: v for cell in cells["with"] for n, v in cell.items() if n not in source.dims and v != base[n]}
+    changed = {n: v for cell in cells["with"] for n, v in cell.items() if v != base[n]}
+    if along := [name for name in changed if name in source.dims]:
+        faults.append(f"with: {along[0]} is an axis of the map; change what is the same in all cells")
+        changed = {name: value for name, value in changed.items() if name not in along}
     return replace(state, cells=tuple(cells["cell"]), changed=changed), faults
 
 

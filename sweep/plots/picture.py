@@ -121,6 +121,8 @@ def plot(
         raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {scales.LARGEST:g}", "limits")
     if figsize is not None and not (_is_pair(figsize) and min(figsize) > 0):
         raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
+    if figsize is not None and width is not None:
+        raise fault_of("is the width of the figure as well; give width or figsize", "figsize")
     if sel is not None and not isinstance(sel, Mapping):
         raise fault_of(refusal(sel, "values by axis, such as {'n0': 0.05}"), "sel")
     if cmap is not None:

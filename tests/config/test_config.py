@@ -6,11 +6,13 @@ from typing import Any
 import numpy as np
 import pandas
 import pytest
+import xarray as xr
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from support import SMALL, Write
 from support.physics import STONE, stone
 
+import sweep
 from sweep import Config, ConfigError, load_config
 from sweep.config.values import Range
 
@@ -45,6 +47,11 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
         assert load_config(write(), same).fingerprint() == first
     for other in ({"mu": [40, 61]}, {"t_end": 1501}, {"step": 0.01}, {"measure": ["reversals"]}, {"y0": 0.02}):
         assert load_config(write(), other).fingerprint() != first
+
+
+def test_a_dataset_is_no_configuration(small: xr.Dataset) -> None:
+    with pytest.raises(ConfigError, match=r"^this is a dataset, not a configuration"):
+        sweep.trajectory(small, mu=40)
 
 
 @pytest.mark.parametrize("table", [dict, pandas.DataFrame])

@@ -94,6 +94,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     ("model: analytic\nfriction: {mu: [40, 60]}\nrefine: 2\n", 3, "refine", "is not simulated; set it to 0"),
     ("friction: {mu: {start: 1, stop: 2, num: 5000}}\nbody: {b: {start: 2, stop: 3, num: 5000}}\nrefine: 1\n", 3, "refine", "keep to 16777216"),
     ("cases: {mu: [60]}\nbody: {b: [1, 2]}\n", 2, "body.b", "cannot be an axis together with cases"),
+    ("model: averaged\nfriction: {mu: 1e-320}\n", 2, "friction.mu", "must be at least 1e-100 for the averaged model"),
     ("cases: {mu: [60, 0]}\nmodel: averaged\n", 1, "cases", "column mu: must be > 0 for the averaged model"),
     ("cases: {mu: [60]}\nrefine: 1\n", 2, "refine", "cannot be combined with cases, which have no neighbours"),
     (mu("{normal: [5, 9]}") + "samples: 32\n", 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, but 9 of 32 samples"),

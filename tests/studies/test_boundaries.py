@@ -265,6 +265,8 @@ def test_what_cannot_be_searched_is_refused(write: Write) -> None:
     one = write("friction: {mu: [60, 70]}\n", "one.yaml")
     refused(invoke("boundaries", one), "boundaries need two axes")
     refused(invoke("boundaries", one, "--x", "c"), "--x: c is not an axis of more than one value", "mu")
+    two = write("friction: {mu: [60, 70]}\nbody: {b: [2, 3]}\n", "two.yaml")
+    refused(invoke("boundaries", two, "--x", "b", "--y", "b"), "--y: b is the other axis already")
 
 
 def traced(edge: Callable[[Array], Array], points: int, deviation: float) -> tuple[Curve, int]:
