@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import sweep
+from sweep.jit import compiled
 from sweep.models.ladder import slip
-from sweep.models.slow import follow
+from sweep.models.slow import elementary, follow
 from sweep.models.slow import foresee as slow
 from sweep.models.slow.exchange import RESONANT, SECOND, TERMS, THIRD, make_exchange
 from sweep.models.stiff.modes import RATTLE
@@ -212,9 +213,9 @@ def test_orders_of_the_corrections(b: float) -> None:
         found = []
         for share in (1e-12, 1.0):
             by = (1 + np.outer(kappa, e1 + e2)) / share
-            C = follow._rates(table[0], by[0], e1, e2, beat)
+            C = np.transpose([follow._rates(table[0], *each) for each in zip(by[0], e1, e2, beat, strict=True)])
             rests = true[0] - C[0] * a[0] - C[1] * a[1], true[1] - C[2] * a[0] - C[3] * a[1]
-            turned = true[6] + follow._turning(table[0], by[1], e1, e2, beat)
+            turned = true[6] + [follow._turning(table[0], *each) for each in zip(by[1], e1, e2, beat, strict=True)]
             found.append([abs(np.mean(rest * each.conj())) for rest, each in zip(rests, unit, strict=True)])
             found[-1].append(abs(turned.mean()))
         return np.array(found)
@@ -224,3 +225,25 @@ def test_orders_of_the_corrections(b: float) -> None:
     orders = orders[:-1] - orders[1:]
     print(f"b = {b}\n{orders.round(2)}")
     np.testing.assert_allclose(orders[-1], [[3, 3, 4], [5, 5, 6]], atol=0.15)
+
+
+def test_elementary_functions_are_those_of_numpy() -> None:
+    small = np.logspace(-15, 2.8, 300)
+    x = np.concatenate([-small, [0.0], small])
+    np.testing.assert_allclose([elementary.exp(each) for each in x], np.exp(x), rtol=1e-12)
+    np.testing.assert_allclose([elementary.exp(each) - 1.0 for each in small[:50]], np.expm1(small[:50]), atol=3e-16)
+    np.testing.assert_allclose([elementary.turn_by(each) for each in x], np.exp(1j * x), atol=1e-13)
+    y = np.concatenate([-np.logspace(-12, -1e-9, 300), np.logspace(-12, 25, 300)])
+    np.testing.assert_allclose([elementary.log1p(each) for each in y], np.log1p(y), rtol=0.011)
+
+
+@pytest.mark.x86
+def test_the_steps_are_vector_instructions() -> None:
+    steps = follow.make_follow()
+    made = compiled(lambda tables, starts, cells, size, slow, counts, over: steps(
+        tables, starts, cells, size, slow, counts, over))  # fmt: skip
+    made.compile("(c16[:, :, ::1], f8[:, ::1], i8[::1], f8, f8, f8[::1], f8[::1])")
+    (assembly,) = made.inspect_asm().values()
+    # There are scalar loops as well, for arrays that overlap, which they never do.
+    assert assembly.count("divpd") > 20
+    assert assembly.count("sqrtpd") > 10

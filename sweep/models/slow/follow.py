@@ -3,15 +3,26 @@
 Within a step the spin and the coefficients stay as they are in its middle.  The amplitudes then turn and grow as the
 modes of a 2 × 2 matrix do, and their products, which drive the spin, are integrated exactly over the step.  So a step
 may be long compared with the beat of the modes, unless the beat is slow enough for T to act on it.
+
+Trajectories run side by side in lanes, whose steps are vector instructions.  A lane that has ended is computed with the
+others until the next one takes its place.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sweep.jit import called, inline
+from sweep.jit import INTERPRETED, called, full_width, inline
+from sweep.models.generated import compile_inline, tuple_of
+from sweep.models.slow.elementary import exp, log1p, turn_by
 from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS, quotient, square
 from sweep.models.stiff.final_spin import lasts
+
+# With 16 lanes a step takes a fifth longer, and with 64 more of them wait for the last ones.
+_LANES = 1 if INTERPRETED else 32
+
+# Steps between two looks at which lanes have ended.
+_BLOCK = 8
 
 # A step turns the spin by no more than this share of what a mode can.  The rates, whose derivative by the spin is about
 # |H|, change the logarithm of an amplitude in a step by no more than `_CHANGE` compared with constant rates.
@@ -36,24 +47,61 @@ _FAR = 3.0
 _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
 
-@called
-def _at(t, x, s):
-    """The coefficients at a spin; t and s hold real and imaginary parts."""
-    for k in range(2 * LOWEST):
-        s[k] = (((t[4, k] * x + t[3, k]) * x + t[2, k]) * x + t[1, k]) * x + t[0, k]
-    for k in range(2 * LOWEST, 2 * TERMS):
-        s[k] = (t[2, k] * x + t[1, k]) * x + t[0, k]
+# Where the lanes of each quantity begin in a group; complex numbers take two rows.
+(_Z1, _Z2, _V11, _V12, _V21, _V22, _REST, _BETWEEN, _N, _OLD, _COUNT, _KEEP, _STEP, _STEPS, _STATE, _REACH, _SIZE, _D,
+ _STRONG, _FAR_APART, _BENT_RATES, _BENT_TURN, _E1, _E2, _X, _GROUP) = (
+    _LANES * row for row in (*range(0, 16, 2), *range(16, 34)))  # fmt: skip
+
+_RUNNING, _OVER_NOW, _FAILED = 0.0, 1.0, 2.0
+
+_PLACES = (f"s[{k * _LANES} + lane]" for k in range(2 * TERMS))
+_SUMS = tuple_of(f"complex({real}, {imaginary})" for real, imaginary in zip(_PLACES, _PLACES, strict=True))
+_load_sums = compile_inline("load_sums", "s, lane", [f"return {_SUMS}"], {})
+
+
+@inline
+def _get(rows, at, lane):
+    return complex(rows[at + lane], rows[at + _LANES + lane])
+
+
+@inline
+def _put(rows, at, lane, z):
+    rows[at + lane], rows[at + _LANES + lane] = z.real, z.imag
+
+
+@inline
+def _get_modes(g, lane):
+    """The amplitudes z_1 and z_2 of the modes V."""
+    V = (_get(g, _V11, lane), _get(g, _V12, lane), _get(g, _V21, lane), _get(g, _V22, lane))
+    return _get(g, _Z1, lane), _get(g, _Z2, lane), V
+
+
+@inline
+def _put_modes(g, lane, z1, z2, V):
+    _put(g, _Z1, lane, z1)
+    _put(g, _Z2, lane, z2)
+    _put(g, _V11, lane, V[0])
+    _put(g, _V12, lane, V[1])
+    _put(g, _V21, lane, V[2])
+    _put(g, _V22, lane, V[3])
+
+
+@inline
+def _times(x, z):
+    """A real number times a complex one, for which Numba would make the first one complex."""
+    return complex(x * z.real, x * z.imag)
 
 
 @inline
 def _rates(sums, by, e1, e2, beat):
     """C with T, divided by `by`, for products of the amplitudes: e_1, e_2 and `beat`, which is a_1 a_2*."""
     back = np.conj(beat)
+    share = 1.0 / by  # a complex division would have to check for zero
     return (
-        sums[0] + (sums[7] * e1 + sums[8] * beat + sums[10] * e2) / by,
-        sums[1] + (sums[9] * e1 + sums[11] * back + sums[12] * e2) / by,
-        sums[2] + (sums[13] * e1 + sums[14] * beat + sums[16] * e2) / by,
-        sums[3] + (sums[15] * e1 + sums[17] * back + sums[18] * e2) / by,
+        sums[0] + _times(share, _times(e1, sums[7]) + sums[8] * beat + _times(e2, sums[10])),
+        sums[1] + _times(share, _times(e1, sums[9]) + sums[11] * back + _times(e2, sums[12])),
+        sums[2] + _times(share, _times(e1, sums[13]) + sums[14] * beat + _times(e2, sums[16])),
+        sums[3] + _times(share, _times(e1, sums[15]) + sums[17] * back + _times(e2, sums[18])),
     )
 
 
@@ -61,27 +109,38 @@ def _rates(sums, by, e1, e2, beat):
 def _turning(sums, by, e1, e2, beat):
     """n' with Q, divided by `by`."""
     pairs = sums[19].real * e1 * e1 + sums[20].real * e1 * e2 + sums[21].real * e2 * e2
-    pairs += 2.0 * ((sums[22] * e1 + sums[23] * e2 + sums[24] * beat) * beat).real
+    pairs += 2.0 * ((_times(e1, sums[22]) + _times(e2, sums[23]) + sums[24] * beat) * beat).real
     return sums[4].real * e1 + sums[5].real * e2 + 2.0 * (sums[6] * beat).real + pairs / by
 
 
-@called
+@inline
+def _root(z):
+    """A square root of z, which is not 0."""
+    large = np.sqrt(0.5 * (np.sqrt(square(z)) + abs(z.real)))
+    small = 0.5 * z.imag / (large + _TINY)
+    return complex(large if z.real >= 0.0 else small, small if z.real >= 0.0 else large)
+
+
+@inline
 def _modes(C):
     """Eigenvalues and eigenvectors of a 2 × 2 matrix, (λ_1, λ_2, (V_11, V_12, V_21, V_22))."""
     c11, c12, c21, c22 = C
-    middle, half = 0.5 * (c11 + c22), 0.5 * (c11 - c22)
-    root, scale = np.sqrt(half * half + c12 * c21), np.sqrt(square(c12) + square(c21) + square(half))
-    root = root if square(root) > (_APART * scale) ** 2 else _APART * scale + 0j
-    root = root if (half * np.conj(root)).real >= 0 else -root
+    middle, half = _times(0.5, c11 + c22), _times(0.5, c11 - c22)
+    root, least = half * half + c12 * c21, _APART**2 * (square(c12) + square(c21) + square(half))
+    apart = square(root) > least * least
+    root = _root(complex(root.real if apart else least, root.imag if apart else 0.0))
+    sign = 1.0 if half.real * root.real + half.imag * root.imag >= 0.0 else -1.0
+    root = _times(sign, root)
     big = half + root
-    norm1, norm2 = np.sqrt(square(big) + square(c21)) + _TINY, np.sqrt(square(big) + square(c12)) + _TINY
-    return middle + root, middle - root, (big / norm1, -c12 / norm2, c21 / norm1, big / norm2)
+    by1, by2 = 1.0 / np.sqrt(square(big) + square(c21) + _TINY), 1.0 / np.sqrt(square(big) + square(c12) + _TINY)
+    return middle + root, middle - root, (_times(by1, big), _times(-by2, c12), _times(by1, c21), _times(by2, big))
 
 
 @inline
 def _turned(z1, z2, V, W, keep):
     """Amplitudes z of the modes V as those of the modes W; with `keep` = 0, each mode keeps to itself."""
-    by = quotient(1.0, W[0] * W[3] - W[1] * W[2])
+    determinant = W[0] * W[3] - W[1] * W[2]
+    by = _times(1.0 / square(determinant), np.conj(determinant))
     first = z1 * (W[3] * V[0] - W[1] * V[2]) + keep * z2 * (W[3] * V[1] - W[1] * V[3])
     return by * first, by * (keep * z1 * (W[0] * V[2] - W[2] * V[0]) + z2 * (W[0] * V[3] - W[2] * V[1]))
 
@@ -90,15 +149,21 @@ def _turned(z1, z2, V, W, keep):
 def _until(way, turn, rate):
     """The time in which a mode of a rate turns the spin by `way`: longer than any step if it never does."""
     turned = 2.0 * rate * way / (turn + _TINY)
-    if turned <= -1.0:
-        return _LONG
-    return way / (turn + way / _LONG) if abs(turned) < 1e-6 else np.log1p(turned) / (2.0 * rate)
+    soon = way / (turn + way / _LONG) if abs(turned) < 1e-6 else log1p(max(turned, -1.0)) / (2.0 * rate)
+    return soon if turned > -1.0 else _LONG
 
 
 @inline
 def _mean(after, turn):
     """The mean over a step of an exponential that is 1 before it and `after` = exp(turn) at its end."""
-    return 1.0 + 0.5 * turn if abs(turn.real) + abs(turn.imag) < 1e-6 else quotient(after - 1.0, turn)
+    small, z = abs(turn.real) + abs(turn.imag) < 1e-6, quotient(after - 1.0, turn)
+    return complex(1.0 + 0.5 * turn.real if small else z.real, 0.5 * turn.imag if small else z.imag)
+
+
+@inline
+def _real_mean(after, turn):
+    """As `_mean`, of real numbers."""
+    return 1.0 + 0.5 * turn if abs(turn) < 1e-6 else (after - 1.0) / turn
 
 
 @inline
@@ -106,7 +171,7 @@ def _products(e1, e2, cross, V):
     """|a_1|², |a_2|² and a_1 a_2*, from the same products of the amplitudes of the modes V."""
     first = square(V[0]) * e1 + square(V[1]) * e2 + 2.0 * (V[0] * np.conj(V[1]) * cross).real
     second = square(V[2]) * e1 + square(V[3]) * e2 + 2.0 * (V[2] * np.conj(V[3]) * cross).real
-    beat = V[0] * np.conj(V[2]) * e1 + V[1] * np.conj(V[3]) * e2
+    beat = _times(e1, V[0] * np.conj(V[2])) + _times(e2, V[1] * np.conj(V[3]))
     return first, second, beat + V[0] * np.conj(V[3]) * cross + V[1] * np.conj(V[2]) * np.conj(cross)
 
 
@@ -114,93 +179,175 @@ def _products(e1, e2, cross, V):
 def _grown(step, rate1, rate2):
     """What modes grow by in a step, and how far the phase between them turns; their common phase drives nothing."""
     phase = step * (rate1.imag - rate2.imag)
-    return np.exp(step * rate1.real), np.exp(step * rate2.real), complex(np.cos(phase), np.sin(phase))
+    return exp(step * rate1.real), exp(step * rate2.real), turn_by(phase)
 
 
-@called
+@inline
 def _means(z1, z2, step, rate1, rate2, grown, V):
     """The means of |a_1|², |a_2|² and a_1 a_2* over a step in which modes of amplitudes z grow."""
     g1, g2, turned = grown
-    e1 = square(z1) * _mean(g1 * g1, 2.0 * step * rate1.real)
-    e2 = square(z2) * _mean(g2 * g2, 2.0 * step * rate2.real)
-    return _products(e1, e2, z1 * np.conj(z2) * _mean(g1 * g2 * turned, step * (rate1 + np.conj(rate2))), V)
+    e1 = square(z1) * _real_mean(g1 * g1, 2.0 * step * rate1.real)
+    e2 = square(z2) * _real_mean(g2 * g2, 2.0 * step * rate2.real)
+    return _products(e1, e2, z1 * np.conj(z2) * _mean(_times(g1 * g2, turned), _times(step, rate1 + np.conj(rate2))), V)
 
 
-@called
-def follow(a1, a2, n, table, bent, d, reach, size):
-    """Follow the slow equations from (a_1, a_2, n).
-
-    Parameters
-    ----------
-    table, bent, d, reach : the coefficients of `sweep.models.slow.exchange`
-    size : factor of T and Q, 1 but for a test of how much depends on them
-
-    Returns
-    -------
-    The number of reversals, and whether the equations describe the motion to its end.  Changes of sign are those of the
-    spin without its beat, Re H_12 a_1 a_2* / (i ω_1 - i ω_2) at rest: the simulated count is of the ripple-free spin.
-    """
-    sums = np.empty(table.shape[1], table.dtype)
-    parts, part = table.view(np.float64), sums.view(np.float64)
-    strong = 0.0
-    for k in range(LOWEST, HIGHER):
-        strong += 0.5 * square(table[0, k])
-    strong = size * np.sqrt(strong)
-    far = table[0, 3].imag > 2.0 * table[0, 0].imag
-    at_rest = 2.0 * table[0, 6].real / (1j * (table[0, 0] - table[0, 3]).imag)
-    count, old, keep = 0, 0.0, 1.0
-    z1, z2, V = a1, a2, (1.0 + 0j, 0j, 0j, 1.0 + 0j)
-    for _ in range(_MOST_STEPS):
-        e1, e2, beat = _products(square(z1), square(z2), keep * z1 * np.conj(z2), V)
-        _at(parts, n / reach, part)
-        rate1, rate2, W = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
-        z1, z2 = _turned(z1, z2, V, W, keep)
-        V = W
-        f1, f2, r1, r2, apart = square(z1), square(z2), rate1.real, rate2.real, abs(rate1.imag - rate2.imag)
-        g1, g2, g12 = _turns(sums, V)
-        beats = 2.0 * quotient(g12 * z1 * np.conj(z2), rate1 + np.conj(rate2)) if far else at_rest * beat
-        new = n - beats.real
-        count, old = count + (new * old < 0.0), new
-        turn1, turn2, cross = abs(g1) * f1, abs(g2) * f2, 2.0 * np.sqrt(square(g12) * f1 * f2)
-        beating = cross / np.sqrt(square(rate1 + np.conj(rate2)))
-        left = 0.5 * turn1 / abs(r1) + 0.5 * turn2 / abs(r2) + beating
-        lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
-        if r1 < 0.0 and r2 < 0.0 and others + beating < _OVER * lasting:
-            return count, True
-        way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(abs(g1), abs(g2), _TINY))
-        step = min(_until(way, turn1, r1), _until(way, turn2, r2))
-        step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
-        step = min(step, _CHANGE / (max(abs(g1), abs(g2)) * min(way, left) + _TINY), _SLOWED / (d + _TINY))
-        acts = 2.0 * strong * np.sqrt(f1 * f2)
-        if acts > _ACTS * apart:
-            step = min(step, _BEAT / (apart + acts))
-        keep = 0.0 if apart * step > _APART_STEP else 1.0
-        grown = _grown(0.5 * step, rate1, rate2)
-        e1, e2, beat = _means(z1, z2, 0.5 * step, rate1, rate2, grown, V)
-        middle = n + 0.5 * step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
-        middle *= np.exp(-0.5 * d * step)
-        grown = (grown[0] * grown[0], grown[1] * grown[1], grown[2] * grown[2])
-        e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
-        _at(parts, middle / reach, part)
-        rate1, rate2, W = _modes(_rates(sums, (1.0 + bent[0] * (e1 + e2)) / size, e1, e2, beat))
-        z1, z2 = _turned(z1, z2, V, W, keep)
-        V = W
-        grown = _grown(step, rate1, rate2)
-        e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
-        n += step * _turning(sums, (1.0 + bent[1] * (e1 + e2)) / size, e1, e2, beat)
-        n *= np.exp(-d * step)
-        z1, z2 = z1 * grown[0], z2 * grown[1] * np.conj(grown[2])
-        if not abs(n) < _FAR * reach:
-            break
-    return count, False
-
-
-@called
+@inline
 def _turns(sums, V):
     """H in the modes V: of each, and of both."""
     h1, h2, h12 = sums[4].real, sums[5].real, sums[6]
     one = h1 * square(V[0]) + h2 * square(V[2]) + 2.0 * (h12 * V[0] * np.conj(V[2])).real
     other = h1 * square(V[1]) + h2 * square(V[3]) + 2.0 * (h12 * V[1] * np.conj(V[3])).real
-    both = h1 * V[0] * np.conj(V[1]) + h2 * V[2] * np.conj(V[3])
+    both = _times(h1, V[0] * np.conj(V[1])) + _times(h2, V[2] * np.conj(V[3]))
     both += h12 * V[0] * np.conj(V[3]) + np.conj(h12) * V[2] * np.conj(V[1])
     return one, other, both
+
+
+@inline
+def _resolved(g, lane, sums, e1, e2, beat):
+    """The rates at these products of the amplitudes, the amplitudes in the modes of these, and the modes."""
+    z1, z2, V = _get_modes(g, lane)
+    by = (1.0 + g[_BENT_RATES + lane] * (e1 + e2)) / g[_SIZE + lane]
+    rate1, rate2, W = _modes(_rates(sums, by, e1, e2, beat))
+    z1, z2 = _turned(z1, z2, V, W, g[_KEEP + lane])
+    return rate1, rate2, z1, z2, W
+
+
+@inline
+def _turn_of(g, lane, sums, e1, e2, beat):
+    """n' at these means of the products of the amplitudes."""
+    return _turning(sums, (1.0 + g[_BENT_TURN + lane] * (e1 + e2)) / g[_SIZE + lane], e1, e2, beat)
+
+
+@inline
+def _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
+    """The length of a step; h1 and h2 are the sizes of H in the modes."""
+    r1, r2 = rate1.real, rate2.real
+    way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(h1, h2, _TINY))
+    step = min(_until(way, h1 * f1, r1), _until(way, h2 * f2, r2))
+    step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
+    step = min(step, _CHANGE / (max(h1, h2) * min(way, left) + _TINY), _SLOWED / (d + _TINY))
+    acts = 2.0 * strong * np.sqrt(f1 * f2)
+    return min(step, _BEAT / (apart + acts)) if acts > _ACTS * apart else step
+
+
+def make_follow():
+    """Compiled (tables, starts, cells, size, slow, counts, over) -> None: follows the slow equations of `cells`.
+
+    Parameters
+    ----------
+    tables : the coefficients of `sweep.models.slow.exchange`, of all cells
+    starts : of all cells, shape (cells, 9): real and imaginary parts of a_1 and a_2, n, the fastest spin, d, the two κ
+    cells : which of them to follow
+    size, slow : factors of T and Q, and of d: 1 but for tests of how much depends on them
+    counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
+
+    Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (i ω_1 - i ω_2) at rest: the simulated
+    count is of the ripple-free spin.
+    """
+    wide, load_sums = full_width(), _load_sums
+
+    @called
+    def coefficients(t, g, s):
+        """The coefficients at a spin."""
+        wide()
+        for k in range(2 * LOWEST):
+            for lane in range(_LANES):
+                x = g[_X + lane]
+                value = ((t[4, k, lane] * x + t[3, k, lane]) * x + t[2, k, lane]) * x + t[1, k, lane]
+                s[k * _LANES + lane] = value * x + t[0, k, lane]
+        for k in range(2 * LOWEST, 2 * TERMS):
+            for lane in range(_LANES):
+                x = g[_X + lane]
+                s[k * _LANES + lane] = (t[2, k, lane] * x + t[1, k, lane]) * x + t[0, k, lane]
+
+    @called
+    def begin(g, s):
+        """Count a reversal, choose a step, and find the spin in its middle."""
+        wide()
+        for lane in range(_LANES):
+            n, d, state, sums = g[_N + lane], g[_D + lane], g[_STATE + lane], load_sums(s, lane)
+            z1, z2, V = _get_modes(g, lane)
+            e1, e2, beat = _products(square(z1), square(z2), _times(g[_KEEP + lane], z1 * np.conj(z2)), V)
+            rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
+            f1, f2, r1, r2, apart = square(z1), square(z2), rate1.real, rate2.real, abs(rate1.imag - rate2.imag)
+            (g1, g2, g12), both, running = _turns(sums, V), rate1 + np.conj(rate2), state == _RUNNING
+            near, far = (_get(g, _REST, lane) * beat).real, 2.0 * quotient(g12 * z1 * np.conj(z2), both).real
+            new = n - (far if g[_FAR_APART + lane] > 0.0 else near)
+            g[_COUNT + lane] += 1.0 if running & (new * g[_OLD + lane] < 0.0) else 0.0
+            g[_OLD + lane] = new
+            h1, h2, cross = abs(g1), abs(g2), 2.0 * np.sqrt(square(g12) * f1 * f2)
+            beating = cross / np.sqrt(square(both))
+            lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
+            over = (r1 < 0.0) & (r2 < 0.0) & (others + beating < _OVER * lasting)
+            g[_STATE + lane] = _OVER_NOW if running & over else state
+            left = 0.5 * h1 * f1 / abs(r1) + 0.5 * h2 * f2 / abs(r2) + beating
+            step = _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, g[_STRONG + lane])
+            g[_STEP + lane], g[_KEEP + lane] = step, 0.0 if apart * step > _APART_STEP else 1.0
+            grown = _grown(0.5 * step, rate1, rate2)
+            e1, e2, beat = _means(z1, z2, 0.5 * step, rate1, rate2, grown, V)
+            middle = (n + 0.5 * step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-0.5 * d * step)
+            grown = (grown[0] * grown[0], grown[1] * grown[1], grown[2] * grown[2])
+            g[_E1 + lane], g[_E2 + lane], beat = _means(z1, z2, step, rate1, rate2, grown, V)
+            g[_X + lane] = middle / g[_REACH + lane]
+            _put(g, _BETWEEN, lane, beat)
+            _put_modes(g, lane, z1, z2, V)
+
+    @called
+    def end(g, s):
+        """Take the step with the coefficients of its middle."""
+        wide()
+        for lane in range(_LANES):
+            sums, step, state, reach = load_sums(s, lane), g[_STEP + lane], g[_STATE + lane], g[_REACH + lane]
+            e1, e2, beat = g[_E1 + lane], g[_E2 + lane], _get(g, _BETWEEN, lane)
+            rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
+            grown = _grown(step, rate1, rate2)
+            e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
+            n = (g[_N + lane] + step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-g[_D + lane] * step)
+            steps = g[_STEPS + lane] + 1.0
+            fails = (not abs(n) < _FAR * reach) | (steps >= _MOST_STEPS)
+            g[_STATE + lane] = _FAILED if (state == _RUNNING) & fails else state
+            g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n / reach, steps
+            _put_modes(g, lane, _times(grown[0], z1), _times(grown[1], z2) * np.conj(grown[2]), V)
+
+    @called
+    def fill(g, t, lane, table, start, size, slow):
+        """Set a lane to the beginning of a trajectory."""
+        parts, strong = table.view(np.float64), 0.0
+        for j in range(5):
+            for k in range(2 * TERMS):
+                t[j, k, lane] = parts[j, k]
+        for k in range(LOWEST, HIGHER):
+            strong += 0.5 * square(table[0, k])
+        for at in range(0, _GROUP, _LANES):
+            g[at + lane] = 0.0
+        _put(g, _Z1, lane, complex(start[0], start[1]))
+        _put(g, _Z2, lane, complex(start[2], start[3]))
+        g[_V11 + lane] = g[_V22 + lane] = g[_KEEP + lane] = 1.0
+        g[_N + lane], g[_X + lane], g[_REACH + lane] = start[4], start[4] / start[5], start[5]
+        g[_D + lane], g[_BENT_RATES + lane], g[_BENT_TURN + lane] = slow * start[6], start[7], start[8]
+        g[_SIZE + lane], g[_STRONG + lane] = size, size * np.sqrt(strong)
+        g[_FAR_APART + lane] = 1.0 if table[0, 3].imag > 2.0 * table[0, 0].imag else 0.0
+        g[_REST + _LANES + lane] = -2.0 * table[0, 6].real / (table[0, 0] - table[0, 3]).imag
+
+    @called
+    def follow(tables, starts, cells, size, slow, counts, over):
+        g, t, s = np.zeros(_GROUP), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
+        whose, following, begun = np.full(_LANES, -1), 0, 0
+        g[_STATE : _STATE + _LANES] = _FAILED
+        while following or begun < len(cells):
+            for lane in range(_LANES):
+                if g[_STATE + lane] != _RUNNING:
+                    if whose[lane] >= 0:
+                        counts[whose[lane]], over[whose[lane]] = g[_COUNT + lane], g[_STATE + lane] == _OVER_NOW
+                        whose[lane], following = -1, following - 1
+                    if begun < len(cells):
+                        cell = cells[begun]
+                        fill(g, t, lane, tables[cell], starts[cell], size, slow)
+                        whose[lane], begun, following = cell, begun + 1, following + 1
+            for _ in range(_BLOCK):
+                coefficients(t, g, s)
+                begin(g, s)
+                coefficients(t, g, s)
+                end(g, s)
+
+    return follow

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sweep.jit import Cached, called, serial
+from sweep.jit import Cached, called, inline, serial
 from sweep.models.model import Array, take
 from sweep.models.stiff.form import StiffForm
 from sweep.models.stiff.modes import Rattle, slow_rates, slowing
@@ -114,7 +114,7 @@ def _change(e, r, s, d, step):
     return s * e * (step if growth == 0.0 else np.expm1(growth) / rate)
 
 
-@called
+@inline
 def lasts(n, r, d, left0, left1):
     """Sizes of the most slowly decaying term of the spin, and of the others together."""
     if d < min(-2.0 * r[0], -2.0 * r[1]):

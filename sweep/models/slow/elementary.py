@@ -1,0 +1,45 @@
+"""Elementary functions of real numbers by arithmetic alone.
+
+The compiler's own have branches, and a loop that calls one is not vectorised.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sweep.jit import inline
+
+
+@inline
+def exp(x):
+    """The exponential of x, to 1e-12; beyond ±700 that of ±700.
+
+    It is found from expm1(x / 2¹⁶), by expm1(2 x) = expm1(x) (2 + expm1(x)).
+    """
+    r = min(abs(x), 700.0) / 65536.0
+    e = r * (1.0 + r / 2.0 * (1.0 + r / 3.0 * (1.0 + r / 4.0 * (1.0 + r / 5.0 * (1.0 + r / 6.0)))))
+    for _ in range(16):
+        e = e * (2.0 + e)
+    return 1.0 + e if x >= 0.0 else 1.0 / (1.0 + e)
+
+
+@inline
+def log1p(x):
+    """The logarithm of 1 + x, to 1 % for x up to 1e25, and too small beyond."""
+    root = 1.0 + min(x, 1e200)
+    for _ in range(5):
+        root = np.sqrt(root)
+    z = (root - 1.0) / (root + 1.0)
+    return 64.0 * z * (1.0 + z * z * (1.0 / 3.0 + z * z * (1.0 / 5.0 + z * z / 7.0)))
+
+
+@inline
+def turn_by(phase):
+    """exp(i phase), to 1e-13: sin and 1 - cos of an eighth of the phase, doubled three times."""
+    u = 0.125 * (phase - 2.0 * np.pi * np.floor(phase / (2.0 * np.pi) + 0.5))
+    q = u * u
+    sin = u * (1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * (1.0 - q / 110.0)))))
+    left = q / 2.0 * (1.0 - q / 12.0 * (1.0 - q / 30.0 * (1.0 - q / 56.0 * (1.0 - q / 90.0 * (1.0 - q / 132.0)))))
+    for _ in range(3):
+        sin, left = 2.0 * sin * (1.0 - left), 2.0 * sin * sin
+    return complex(1.0 - left, sin)
