@@ -134,11 +134,11 @@ def _add(size, m, first, last, series):
 
 @called
 def _resolve(series, turns, first, last, sums):
-    """Sum a series over points times `turns`, of shape (points, 2 harmonics): real and imaginary parts."""
-    for m in range(turns.shape[1]):
+    """Sum a series over points times `turns`, of shape (points, 2 harmonics): real and imaginary parts of the first."""
+    for m in range(len(sums)):
         sums[m] = 0.0
     for i in range(first, last):
-        for m in range(turns.shape[1]):
+        for m in range(len(sums)):
             sums[m] += series[i] * turns[i, m]
 
 
@@ -160,7 +160,7 @@ def _solve(M, x, band, least):
     Elements farther from the diagonal than `band` are 0.  Where a pivot is smaller than `least`, it is made as large.
     """
     for k in range(len(x)):
-        pivot = M[k, k] if abs(M[k, k]) > least else least * M[k, k] / abs(M[k, k])
+        pivot = M[k, k] if square(M[k, k]) > least * least else least * M[k, k] / abs(M[k, k])
         M[k, k], last = pivot, min(k + 1 + band, len(x))
         row = M[k, k + 1 : last]
         for i in range(k + 1, last):
@@ -323,11 +323,11 @@ def make_exchange(model: Model):
             rates, _ = rhs((x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] - n, x[5, i], x[6, i]), p)
             slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], slopes[4, i], slopes[5, i], slopes[6, i] = rates
             slopes[4, i] -= drag
-        share, sums = 1.0 / (last - first), np.zeros(2 * len(THIRD))
+        share, sums, of_spin = 1.0 / (last - first), np.empty(2 * odd.shape[1]), np.empty(2 * len(even))
         _clear(odd)
-        _resolve(slopes[4], _EVEN_TURNS, first, last, sums)
+        _resolve(slopes[4], _EVEN_TURNS, first, last, of_spin)
         for m in range(len(even)):
-            even[m] = share * (sums[2 * m] + 1j * sums[2 * m + 1])
+            even[m] = share * (of_spin[2 * m] + 1j * of_spin[2 * m + 1])
         if len(odd):
             for j, state in enumerate(RATTLE):
                 _resolve(slopes[state], _ODD_TURNS, first, last, sums)
@@ -401,6 +401,7 @@ def make_exchange(model: Model):
         """T and Q at one spin, and the κ at rest; `slope` is the derivative of Y by n."""
         linear, shape, squares = np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype), np.zeros((2, 2))
         w, found, large = np.empty((6, len(THIRD)), E.dtype), np.empty((6, len(THIRD)), E.dtype), sums.copy()
+        resonant = np.empty((2, RESONANT), E.dtype)
         for i in range(2):
             for j in range(2):
                 linear[i, j] = C[i, j]
@@ -418,15 +419,15 @@ def make_exchange(model: Model):
                         found[k + 2, m] -= slope[k, i] * turn
         _solve_third(A, C, Y, found, w)
         _product(E, w, shape[:, 2:])
-        cubes(_USUAL * reach, n, p, shape, inverse, q, linear, found[:2], sums)
+        cubes(_USUAL * reach, n, p, shape, inverse, q, linear, resonant, sums)
         for i in range(2):
             for m in range(RESONANT):
-                sums[LOWEST + i * RESONANT + m] = found[i, m]
+                sums[LOWEST + i * RESONANT + m] = resonant[i, m]
         if rest:
-            cubes(_LARGE * reach, n, p, shape, inverse, q, linear, found[:2], large)
+            cubes(_LARGE * reach, n, p, shape, inverse, q, linear, resonant, large)
             for i in range(2):
                 for m in range(RESONANT):
-                    large[LOWEST + i * RESONANT + m] = found[i, m]
+                    large[LOWEST + i * RESONANT + m] = resonant[i, m]
             for k in range(LOWEST, TERMS):
                 squares[0, k // HIGHER] += abs(sums[k]) ** 2
                 squares[1, k // HIGHER] += abs(large[k]) ** 2
