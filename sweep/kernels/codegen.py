@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from sweep.jit import inline
 from sweep.kernels.layout import Layout, constants_of
+from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Model
 
@@ -47,6 +49,25 @@ def make_access(model: Model, layout: Layout, states: Sequence[str] = ()):
     states = states or model.states
     load_constants = make_load(constants_of(model), layout, model.constants)
     return make_load(states, layout), load_constants, make_store(states, layout)
+
+
+def make_accept(model: Model, layout: Layout):
+    """Inline (group, lane, status, active, y, new, sound, airborne, jammed) -> accepted: keeps the states of a step.
+
+    A lane that is not `active` stays as it is.  So do the states after a step that is not `sound`, and the status says
+    why: a normal force (`airborne`) or a Painlevé denominator (`jammed`) that is not positive, or no number.
+    """
+    store, STATUS = make_store(model.states, layout), layout.at("status")
+
+    @inline
+    def accept(group, lane, status, active, y, new, sound, airborne, jammed):
+        accepted = active & sound
+        store(group, lane, accepted, new, y)
+        failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
+        group[STATUS + lane] = failure if active & (not sound) else status
+        return accepted
+
+    return accept
 
 
 def make_rest(n_states: int, spin_state: int):

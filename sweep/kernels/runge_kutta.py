@@ -13,13 +13,13 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels import tangent
-from sweep.kernels.codegen import make_access
+from sweep.kernels.codegen import make_accept, make_access
 from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, PACK
 from sweep.kernels.measures.measurement import TANGENT
 from sweep.kernels.method import TOLERANCE, Method, Tolerance
-from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
+from sweep.kernels.status import RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model
@@ -67,8 +67,9 @@ class RungeKutta(Stepper):
     def _make_steps(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
         model, layout = self.model, kernel.layout
-        load_states, load_constants, store_states = make_access(model, layout)
+        load_states, load_constants, _ = make_access(model, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
+        accept = make_accept(model, layout)
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, pack, wide = BLOCK, PACK, full_width()
 
@@ -82,11 +83,8 @@ class RungeKutta(Stepper):
                     h, done, status = group[STEP + lane], group[DONE + lane], group[STATUS + lane]
                     new, spin, work, sound, airborne, jammed = step(y, p, h)
                     active = (status == RUNNING) & (done < group[GOAL + lane])
-                    accepted = active & sound
-                    store_states(group, lane, accepted, new, y)
+                    accepted = accept(group, lane, status, active, y, new, sound, airborne, jammed)
                     group[DONE + lane] = done + (1.0 if accepted else 0.0)
-                    failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
-                    group[STATUS + lane] = failure if active & (not sound) else status
                     watch(group, lane, accepted, y, p, spin, work, h, (done + 1.0) * h)
 
         return run_block

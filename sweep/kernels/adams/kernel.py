@@ -31,13 +31,12 @@ from sweep.kernels.adams.step import (
     POINT,
     PREDICT,
     PREDICTOR_NODES,
-    make_accept,
     make_advance,
     make_formulas,
     make_history,
     work_of,
 )
-from sweep.kernels.codegen import make_access
+from sweep.kernels.codegen import make_accept, make_access
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, PACK, Table
 from sweep.kernels.measures.measurement import WORK, Stretch
@@ -161,7 +160,7 @@ class Adams(Stepper):
         load_states, load_constants, _ = make_access(self.model, layout)
         load_points, append = make_history(size)
         load_formulas = make_formulas("group, lane", lambda name: f"group[{layout.at(name)} + lane]")
-        advance, accept = make_advance(self.form), make_accept(self.form, layout)
+        advance, accept = make_advance(self.form), make_accept(self.model, layout)
         work_done, watch, wide = _make_work(kernel), kernel.make_watch(), full_width()
         FIRST, BEGIN, STEP, GOAL = map(layout.at, (_HISTORY[0], "begin", "step", "goal"))
         DONE, STATUS, SPIN = map(layout.at, ("done", "status", "spin"))
@@ -188,7 +187,9 @@ class Adams(Stepper):
                     points = load_points(history, oldest, lane)
                     formulas = load_formulas(group, lane)
                     new, slopes, spin, (num, den), power = advance(y, points, formulas, p)
-                    accepted = accept(group, lane, status, active, y, new, num, den)
+                    accepted = accept(
+                        group, lane, status, active, y, new, (num > 0.0) & (den > 0.0), num <= 0.0, den <= 0.0
+                    )
                     append(history, oldest + kept, lane, slopes + new[5:])
                     old, group[DONE + lane] = group[SPIN + lane], done + (1.0 if accepted else 0.0)
                     group[SPIN + lane] = spin if accepted else old

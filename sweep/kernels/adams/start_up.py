@@ -22,17 +22,16 @@ from sweep.kernels.adams.step import (
     POINT,
     PREDICT,
     PREDICTOR_NODES,
-    make_accept,
     make_advance,
     make_formulas,
     make_history,
     work_of,
 )
 from sweep.kernels.adams.weights import plain_weights
-from sweep.kernels.codegen import make_access, make_scatter
+from sweep.kernels.codegen import make_accept, make_access, make_scatter
 from sweep.kernels.layout import LANES, Layout, Table, constants_of
 from sweep.kernels.runge_kutta import make_step
-from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING
+from sweep.kernels.status import RUNNING
 from sweep.kernels.tableau import DOPRI5
 from sweep.models.model import Array
 from sweep.models.stiff.form import StiffForm
@@ -141,7 +140,7 @@ def _weights() -> dict[str, float]:
 def _make_layer_step(form: StiffForm):
     """Compiled (group) -> None: a step of dopri5 of all lanes."""
     kept, full = layout(form), form.full
-    load, load_constants, store = make_access(form.model, kept)
+    (load, load_constants, _), accept = make_access(form.model, kept), make_accept(form.model, kept)
     step, lanes, wide = make_step(DOPRI5, full.rhs, len(full.states)), LANES, full_width()
     H, STATUS, TICKS, WORK = map(kept.at, ("h", "status", "ticks", "work"))
 
@@ -151,11 +150,7 @@ def _make_layer_step(form: StiffForm):
         for lane in range(lanes):
             y, p, status = load(group, lane), load_constants(group, lane), group[STATUS + lane]
             new, _, work, sound, airborne, jammed = step(y, p, group[H + lane])
-            active = status == RUNNING
-            accepted = active & sound
-            store(group, lane, accepted, new, y)
-            failure = PARADOX if jammed else (LIFT_OFF if airborne else DIVERGED)
-            group[STATUS + lane] = failure if active & (not sound) else status
+            accepted = accept(group, lane, status, status == RUNNING, y, new, sound, airborne, jammed)
             group[TICKS + lane] += 0.5 if accepted else 0.0
             group[WORK + lane] += work if accepted else 0.0
 
@@ -228,7 +223,7 @@ def _make_advance(form: StiffForm):
     load, load_constants, _ = make_access(form.model, kept)
     load_points, put = make_history(_POINT_SIZE)
     load_formulas = make_formulas("group, lane, h", at)
-    advance_lane, accept = make_advance(form), make_accept(form, kept)
+    advance_lane, accept = make_advance(form), make_accept(form.model, kept)
     H, STATUS, TICKS, WORK = map(kept.at, ("h", "status", "ticks", "work"))
     newest, newest_power, lanes, wide = HISTORY * _POINT_SIZE, HISTORY * _POINT_SIZE + _POWER, LANES, full_width()
     size = _POINT_SIZE
@@ -242,7 +237,7 @@ def _make_advance(form: StiffForm):
             active = status == RUNNING
             formulas = load_formulas(group, lane, h)
             new, slopes, _, (num, den), power = advance_lane(y, load_points(points, 0, lane), formulas, p)
-            accepted = accept(group, lane, status, active, y, new, num, den)
+            accepted = accept(group, lane, status, active, y, new, (num > 0.0) & (den > 0.0), num <= 0.0, den <= 0.0)
             put(points, newest, lane, slopes + new[5:])
             last = newest_power + lane
             points[last] = power

@@ -10,9 +10,8 @@ from collections import namedtuple
 from collections.abc import Callable
 
 from sweep.jit import inline
-from sweep.kernels.codegen import make_access, make_gather, make_scatter
-from sweep.kernels.layout import LANES, Layout
-from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
+from sweep.kernels.codegen import make_gather, make_scatter
+from sweep.kernels.layout import LANES
 from sweep.models.generated import tuple_of
 from sweep.models.stiff.form import StiffForm
 from sweep.models.symbols import specialised
@@ -147,24 +146,3 @@ def make_history(size: int):
     """
     places = [f"history[first + {i * LANES + j * size} + lane]" for j in range(HISTORY) for i in range(len(POINT))]
     return make_gather("history, first, lane", places), make_scatter("history, first, lane", places[: len(POINT)])
-
-
-def make_accept(form: StiffForm, layout: Layout):
-    """Inline (group, lane, status, active, y, new, num, den) -> accepted: keeps the new states of a sound step.
-
-    A lane that is not `active` stays as it is; so do the states, and the status says why, where numerator or
-    denominator of the normal force are not positive.
-    """
-    _, _, store = make_access(form.model, layout)
-    STATUS = layout.at("status")
-
-    @inline
-    def accept(group, lane, status, active, y, new, num, den):
-        sound = (num > 0.0) & (den > 0.0)
-        accepted = active & sound
-        store(group, lane, accepted, new, y)
-        failure = PARADOX if den <= 0.0 else (LIFT_OFF if num <= 0.0 else DIVERGED)
-        group[STATUS + lane] = failure if active & (not sound) else status
-        return accepted
-
-    return accept
