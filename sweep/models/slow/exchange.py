@@ -323,17 +323,19 @@ def make_exchange(model: Model):
             rates, _ = rhs((x[0, i], x[1, i], x[2, i], x[3, i], x[4, i] - n, x[5, i], x[6, i]), p)
             slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], slopes[4, i], slopes[5, i], slopes[6, i] = rates
             slopes[4, i] -= drag
-        share, sums, of_spin = 1.0 / (last - first), np.empty(2 * odd.shape[1]), np.empty(2 * len(even))
+        share, waves = 1.0 / (last - first), np.empty(max(len(even), odd.shape[1]), inverse.dtype)
+        sums = waves.view(np.float64)
         _clear(odd)
-        _resolve(slopes[4], _EVEN_TURNS, first, last, of_spin)
+        _resolve(slopes[4], _EVEN_TURNS, first, last, sums[: 2 * len(even)])
         for m in range(len(even)):
-            even[m] = share * (of_spin[2 * m] + 1j * of_spin[2 * m + 1])
+            even[m] = share * waves[m]
         if len(odd):
             for j, state in enumerate(RATTLE):
-                _resolve(slopes[state], _ODD_TURNS, first, last, sums)
+                _resolve(slopes[state], _ODD_TURNS, first, last, sums[: 2 * odd.shape[1]])
                 for k in range(len(odd)):
+                    factor = share * inverse[k, j]
                     for m in range(odd.shape[1]):
-                        odd[k, m] += share * inverse[k, j] * (sums[2 * m] + 1j * sums[2 * m + 1])
+                        odd[k, m] += factor * waves[m]
 
     @called
     def small_shape(E, Y, shape):
