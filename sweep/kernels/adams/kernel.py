@@ -169,8 +169,8 @@ class Adams(Stepper):
         @compiled
         def run_block(group, packs):
             wide()
-            # With a known bound, LLVM sees that no lane counts from the end of an array, and vectorises the loop.
-            last, history = min(pack * packs, lanes), np.empty(kept + block)
+            # With a product as their number LLVM takes lanes for negative, and does not vectorise the loop.
+            last, history = lanes if packs > 1 else pack, np.empty(kept + block)
             for i in range(kept):
                 history[i] = group[FIRST + i]
             for oldest in range(0, block, size):
