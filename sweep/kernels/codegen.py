@@ -9,6 +9,7 @@ is bound to.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import Any
 
 from sweep.jit import inline
@@ -41,7 +42,8 @@ def make_store(names: Sequence[str], layout: Layout):
     return compile_inline("store", "group, lane, keep, new, old", lines, {})
 
 
-def make_access(model: Model, layout: Layout, states: Sequence[str] = ()):
+@cache  # for what is made once is compiled once
+def make_access(model: Model, layout: Layout, states: tuple[str, ...] = ()):
     """Make the functions that begin and end a loop over lanes: load the states, load the constants, store the states.
 
     See `make_load` and `make_store`; `states` replace those of the model.
@@ -57,7 +59,7 @@ def make_accept(model: Model, layout: Layout):
     A lane that is not `active` stays as it is.  So do the states after a step that is not `sound`, and the status says
     why: a normal force (`airborne`) or a Painlevé denominator (`jammed`) that is not positive, or no number.
     """
-    store, STATUS = make_store(model.states, layout), layout.at("status")
+    (_, _, store), STATUS = make_access(model, layout), layout.at("status")
 
     @inline
     def accept(group, lane, status, active, y, new, sound, airborne, jammed):

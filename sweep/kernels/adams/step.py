@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable
+from functools import cache
 
 from sweep.jit import inline
 from sweep.kernels.codegen import make_gather, make_scatter
@@ -138,6 +139,7 @@ def make_formulas(arguments: str, at: Callable[[str], str]):
     return make_gather(arguments, [*weights, at("per_weight"), at("gamma")], Formulas)
 
 
+@cache
 def make_history(size: int):
     """The functions that read and extend a history, of which a point takes `size` numbers.
 
