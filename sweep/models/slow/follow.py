@@ -46,7 +46,6 @@ _FAR = 3.0
 # Eigenvalues differ by at least this share of the matrix; the squares of amplitudes may fall below the smallest number.
 _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
-
 # Where the lanes of each quantity begin in a group; complex numbers take two rows.
 (_Z1, _Z2, _V11, _V12, _V21, _V22, _REST, _BETWEEN, _N, _OLD, _COUNT, _KEEP, _STEP, _STEPS, _STATE, _REACH, _SIZE, _D,
  _STRONG, _FAR_APART, _BENT_RATES, _BENT_TURN, _E1, _E2, _X, _GROUP) = (
@@ -54,6 +53,7 @@ _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
 _RUNNING, _OVER_NOW, _FAILED = 0.0, 1.0, 2.0
 
+# (s, lane) -> all coefficients of a lane, one by one: a loop over them would need an array, and not be vectorised.
 _PLACES = (f"s[{k * _LANES} + lane]" for k in range(2 * TERMS))
 _SUMS = tuple_of(f"complex({real}, {imaginary})" for real, imaginary in zip(_PLACES, _PLACES, strict=True))
 _load_sums = compile_inline("load_sums", "s, lane", [f"return {_SUMS}"], {})
