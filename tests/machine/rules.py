@@ -447,10 +447,11 @@ class Machine(RuleBasedStateMachine):
             self.others.append(cut)
 
     def _saved(self, dataset: xr.Dataset, file: Path) -> bool:
-        """Whether xarray can save a dataset: one that is stacked, or that is from a file and empty, it cannot."""
-        with suppress(ValueError, NotImplementedError, RuntimeError):
+        """Whether xarray can save a dataset: one that is or was stacked, or that is from a file and empty, it cannot."""
+        with suppress(ValueError, NotImplementedError, RuntimeError, TypeError):
             dataset.to_netcdf(file)
-        return file.exists()
+            return True
+        return False
 
     def _reopened(self, dataset: xr.Dataset) -> xr.Dataset | None:
         """A dataset that is saved is the same when it is opened."""
