@@ -447,7 +447,7 @@ class Machine(RuleBasedStateMachine):
             self.others.append(cut)
 
     def _saved(self, dataset: xr.Dataset, file: Path) -> bool:
-        """Whether xarray can save a dataset: one that is or was stacked, or that is from a file and empty, it cannot."""
+        """Whether xarray can save a dataset: not one that is or was stacked, or that is from a file and empty."""
         with suppress(ValueError, NotImplementedError, RuntimeError, TypeError):
             dataset.to_netcdf(file)
             return True
