@@ -20,7 +20,7 @@ from sweep.models.slow.foresee import foresee
 from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
 
-# Cells that a thread foresees at once; a cell takes 0.2 ms, and towards their end lanes are idle.
+# Most cells that a thread foresees at once.  A cell takes 0.2 ms; while the last ones finish, lanes are idle.
 _SOME = 512
 
 # Bodies whose eigenvalues are found at once (about 60 MB); a body takes 0.1 ms.
@@ -79,7 +79,8 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
 def foreseen(model: Model, columns: Columns, *, check: bool = True) -> dict[str, Array]:
     """Return the counts by the slow equations, computed on all threads; `check` as for `foresee`."""
     size = len(next(iter(columns.values())))
-    together = max(1, min(_SOME, -(-size // threads())))
+    rounds = max(1, -(-size // (_SOME * threads())))
+    together = max(1, -(-size // (rounds * threads())))
     parts = [slice(begin, begin + together) for begin in range(0, size, together)]
     found = on_all_threads(lambda some: foresee(model, {k: v[some] for k, v in columns.items()}, check=check), parts)
     return dict(zip(Foreseen.variables, map(np.concatenate, zip(*found, strict=True)), strict=True))

@@ -96,25 +96,21 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
             message = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
             yield path, f"must be {config.table[name].allowed}, but {message}; choose another distribution"
         if name in model.positive and (small := min(value.numbers, default=1.0)) < _LEAST:
-            yield path, f"must be {_above_zero(small)} for the {model.name} model, not {small:g}"
+            yield path, f"must be at least {_LEAST:g} for the {model.name} model, not {small:g}"
     if config.samples and not config.distributions:
         yield ("samples",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
     for name, column in () if config.samples else columns.items():
         if name not in model.parameters:
             yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"
         elif name in model.positive and (small := min(column, default=1.0)) < _LEAST:
-            yield ("cases",), f"column {name}: must be {_above_zero(small)} for the {model.name} model, not {small:g}"
+            yield ("cases",), f"column {name}: must be at least {_LEAST:g} for the {model.name} model, not {small:g}"
     for name in model.parameters:
         if name not in config.parameters and name not in columns:
             yield config.table[name].place, f"missing; give {config.table[name].allowed}"
 
 
-_LEAST = 1e-100
-"""Where a model divides by a parameter, results of smaller values are no numbers."""
-
-
-def _above_zero(value: float) -> str:
-    return f"at least {_LEAST:g}" if value else "> 0"
+_LEAST = 1e-300
+"""Smallest value of a parameter that a model divides by; results overflow for smaller ones."""
 
 
 def _of_integrator(config: Config) -> Iterator[Misfit]:

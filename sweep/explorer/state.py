@@ -188,7 +188,7 @@ def read(
         faults.append(f"{len(asked)} cells are too many; the first {MAX_CELLS} are drawn")
     changed = {n: v for cell in cells["with"] for n, v in cell.items() if v != base[n]}
     if along := [name for name in changed if name in source.dims]:
-        faults.append(f"with: {along[0]} is an axis of the map; change what is the same in all cells")
+        faults.append(f"with: {', '.join(along)} varies in this file; only constant parameters can be changed")
         changed = {name: value for name, value in changed.items() if name not in along}
     return replace(state, cells=tuple(cells["cell"]), changed=changed), faults
 

@@ -42,7 +42,7 @@ def make_store(names: Sequence[str], layout: Layout):
     return compile_inline("store", "group, lane, keep, new, old", lines, {})
 
 
-@cache  # for what is made once is compiled once
+@cache  # so that each is compiled once
 def make_access(model: Model, layout: Layout, states: tuple[str, ...] = ()):
     """Make the functions that begin and end a loop over lanes: load the states, load the constants, store the states.
 
@@ -56,8 +56,9 @@ def make_access(model: Model, layout: Layout, states: tuple[str, ...] = ()):
 def make_accept(model: Model, layout: Layout):
     """Inline (group, lane, status, active, y, new, sound, airborne, jammed) -> accepted: keeps the states of a step.
 
-    A lane that is not `active` stays as it is.  So do the states after a step that is not `sound`, and the status says
-    why: a normal force (`airborne`) or a Painlevé denominator (`jammed`) that is not positive, or no number.
+    A lane that is not `active` keeps its states and status.  After a step that is not `sound` an active lane keeps its
+    states, and its status gives the reason: the normal force (`airborne`) or the Painlevé denominator (`jammed`) is not
+    positive; otherwise the step diverged.
     """
     (_, _, store), STATUS = make_access(model, layout), layout.at("status")
 

@@ -151,7 +151,7 @@ def specialised(function: Callable[..., Any], **arguments: Any):
     Parameters
     ----------
     arguments : for each argument of `function` in their order: None for a number, a count for a tuple of numbers, a
-        `NamedTuple` class for one of those, and `Constants` for p, the last, if it takes any
+        `NamedTuple` class for one of those, and `Constants` for p, which comes last if there is one
 
     If compilation by Numba is disabled, return `function` itself, in which a debugger can stop.
     """

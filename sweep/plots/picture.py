@@ -89,7 +89,7 @@ def plot(
     width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, except subscripts,
         and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
         that was changed
-    figsize : width and height in inches, by default as high as the panels need
+    figsize : width and height in inches, by default as high as the panels need; not together with `width`
     title : whether the figure has a title
     ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
     output : file to write; its suffix names the format: png, pdf, svg or eps
@@ -122,7 +122,7 @@ def plot(
     if figsize is not None and not (_is_pair(figsize) and min(figsize) > 0):
         raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
     if figsize is not None and width is not None:
-        raise fault_of("is the width of the figure as well; give width or figsize", "figsize")
+        raise fault_of("also sets the width; give either width or figsize", "figsize")
     if sel is not None and not isinstance(sel, Mapping):
         raise fault_of(refusal(sel, "values by axis, such as {'n0': 0.05}"), "sel")
     if cmap is not None:

@@ -60,13 +60,13 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
         if name is not None and name not in long:
             message = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
             raise fault_of(message, option)
+    if len(long) < 2:
+        raise config.error((), "boundaries need two axes; give two parameters more than one value")
     if x is not None and x == y:
         raise fault_of(f"{x} is the other axis already; choose two axes", "y")
     rest = (name for name in long if name not in (x, y))
-    up = y or next(rest, None)
-    right = x or next(rest, None)
-    if up is None or right is None:
-        raise config.error((), "boundaries need two axes; give two parameters more than one value")
+    up = y or next(rest)
+    right = x or next(rest)
     return right, up
 
 

@@ -49,7 +49,7 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
         assert load_config(write(), other).fingerprint() != first
 
 
-def test_a_dataset_is_no_configuration(small: xr.Dataset) -> None:
+def test_a_dataset_is_refused_as_a_configuration(small: xr.Dataset) -> None:
     with pytest.raises(ConfigError, match=r"^this is a dataset, not a configuration"):
         sweep.trajectory(small, mu=40)
 

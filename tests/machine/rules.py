@@ -448,10 +448,15 @@ class Machine(RuleBasedStateMachine):
 
     def _saved(self, dataset: xr.Dataset, file: Path) -> bool:
         """Whether xarray can save a dataset: not one that is or was stacked, or that is from a file and empty."""
-        with suppress(ValueError, NotImplementedError, RuntimeError, TypeError):
+        try:
             dataset.to_netcdf(file)
-            return True
-        return False
+        except (ValueError, NotImplementedError, RuntimeError):
+            return False
+        except TypeError:
+            values = (each for v in dataset.variables.values() if v.dtype == object for each in v.values.flat)
+            assert any(isinstance(each, tuple) for each in values)  # it was stacked
+            return False
+        return True
 
     def _reopened(self, dataset: xr.Dataset) -> xr.Dataset | None:
         """A dataset that is saved is the same when it is opened."""

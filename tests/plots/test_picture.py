@@ -286,7 +286,7 @@ def test_axes_in_any_order_of_values() -> None:
         ({"limits": ("a", "b")}, r"limits: must be a lower and a higher finite number"),
         ({"figsize": (1,)}, r"figsize: must be a width and a height in inches, such as \(6, 4\), not \(1,\)"),
         ({"figsize": (0, 2)}, "figsize: must be a width"),
-        ({"figsize": (3, 2), "width": "85mm"}, "figsize: is the width of the figure as well"),
+        ({"figsize": (3, 2), "width": "85mm"}, "figsize: also sets the width"),
         ({"sel": ["n0"]}, "sel: must be values by axis"),
         ({"width": 3}, "width: 3; give a length between 50 and 1000 mm"),
         ({"limits": (0, 2), "variable": "ratio", "ax": Figure().subplots()}, r"limits: 0..2; give numbers above zero"),

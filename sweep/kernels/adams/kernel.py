@@ -32,8 +32,8 @@ from sweep.kernels.adams.step import (
     PREDICT,
     PREDICTOR_NODES,
     make_advance,
-    make_formulas,
     make_history,
+    make_weights,
     work_of,
 )
 from sweep.kernels.codegen import make_accept, make_access
@@ -159,7 +159,7 @@ class Adams(Stepper):
         layout, size = kernel.layout, len(POINT) * LANES
         load_states, load_constants, _ = make_access(self.model, layout)
         load_points, append = make_history(size)
-        load_formulas = make_formulas("group, lane", lambda name: f"group[{layout.at(name)} + lane]")
+        load_weights = make_weights("group, lane", lambda name: f"group[{layout.at(name)} + lane]")
         advance, accept = make_advance(self.form), make_accept(self.model, layout)
         work_done, watch, wide = _make_work(kernel), kernel.make_watch(), full_width()
         FIRST, BEGIN, STEP, GOAL = map(layout.at, (_HISTORY[0], "begin", "step", "goal"))
@@ -169,7 +169,7 @@ class Adams(Stepper):
         @compiled
         def run_block(group, packs):
             wide()
-            # With a product as their number LLVM takes lanes for negative, and does not vectorise the loop.
+            # If the bound were a product, LLVM would take lanes for possibly negative, and not vectorise the loop.
             last, history = lanes if packs > 1 else pack, np.empty(kept + block)
             for i in range(kept):
                 history[i] = group[FIRST + i]
@@ -177,21 +177,17 @@ class Adams(Stepper):
                 for lane in range(last):
                     y = load_states(group, lane)
                     p = load_constants(group, lane)
-                    status, done, h, old = (
-                        group[STATUS + lane],
-                        group[DONE + lane],
-                        group[STEP + lane],
-                        group[SPIN + lane],
-                    )
+                    status, done, h = group[STATUS + lane], group[DONE + lane], group[STEP + lane]
                     active = (status == RUNNING) & (done < group[GOAL + lane])
                     points = load_points(history, oldest, lane)
-                    formulas = load_formulas(group, lane)
-                    new, slopes, spin, (num, den), power = advance(y, points, formulas, p)
+                    w = load_weights(group, lane)
+                    new, slopes, spin, (num, den), power = advance(y, points, w, p)
                     accepted = accept(
                         group, lane, status, active, y, new, (num > 0.0) & (den > 0.0), num <= 0.0, den <= 0.0
                     )
                     append(history, oldest + kept, lane, slopes + new[5:])
-                    old, group[DONE + lane] = group[SPIN + lane], done + (1.0 if accepted else 0.0)
+                    old = group[SPIN + lane]
+                    group[DONE + lane] = done + (1.0 if accepted else 0.0)
                     group[SPIN + lane] = spin if accepted else old
                     work, now = work_done(group, lane, h, power), group[BEGIN + lane] + (done + 1.0) * h
                     watch(group, lane, accepted, y, p, old, work, h, now)
@@ -202,7 +198,7 @@ class Adams(Stepper):
 
 
 def _make_work(kernel: Kernel):
-    """Inline (group, lane, h, power) -> the work of friction in a step, if a measurement needs it."""
+    """Inline (group, lane, h, power) -> the work of friction in a step; 0 if no measurement needs it."""
     if WORK not in kernel.follows:
         return nothing
     POWER0, POWER1, POWER2 = map(kernel.layout.at, stretches.POWERS)

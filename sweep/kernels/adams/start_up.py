@@ -23,8 +23,8 @@ from sweep.kernels.adams.step import (
     PREDICT,
     PREDICTOR_NODES,
     make_advance,
-    make_formulas,
     make_history,
+    make_weights,
     work_of,
 )
 from sweep.kernels.adams.weights import plain_weights
@@ -222,7 +222,7 @@ def _make_advance(form: StiffForm):
 
     load, load_constants, _ = make_access(form.model, kept)
     load_points, put = make_history(_POINT_SIZE)
-    load_formulas = make_formulas("group, lane, h", at)
+    load_weights = make_weights("group, lane, h", at)
     advance_lane, accept = make_advance(form), make_accept(form.model, kept)
     H, STATUS, TICKS, WORK = map(kept.at, ("h", "status", "ticks", "work"))
     newest, newest_power, lanes, wide = HISTORY * _POINT_SIZE, HISTORY * _POINT_SIZE + _POWER, LANES, full_width()
@@ -235,8 +235,8 @@ def _make_advance(form: StiffForm):
             y, p, h = load(group, lane), load_constants(group, lane), group[H + lane]
             status = group[STATUS + lane]
             active = status == RUNNING
-            formulas = load_formulas(group, lane, h)
-            new, slopes, _, (num, den), power = advance_lane(y, load_points(points, 0, lane), formulas, p)
+            w = load_weights(group, lane, h)
+            new, slopes, _, (num, den), power = advance_lane(y, load_points(points, 0, lane), w, p)
             accepted = accept(group, lane, status, active, y, new, (num > 0.0) & (den > 0.0), num <= 0.0, den <= 0.0)
             put(points, newest, lane, slopes + new[5:])
             last = newest_power + lane

@@ -40,8 +40,9 @@ POINT = (*SLOPES, *SLIPS)
 MATRIX = tuple(f"P{i}{j}" for i in range(4) for j in range(4))
 """Names of the elements of P, the implicit part of the corrector (see `sweep.models.theory.rocking.implicit`)."""
 
-Formulas = namedtuple("Formulas", "predict correct matrix per_weight gamma")
-"""The weights of a step: `PREDICT`, `CORRECT`, `MATRIX`, 1 over the weight of the new slope, and that of BDF5's."""
+Weights = namedtuple("Weights", "predict correct matrix per_weight gamma")
+"""What a step multiplies by: the weights `PREDICT` and `CORRECT`, the matrix P (`MATRIX`), 1 over the weight of the new
+slope, and the weight of the new slope in BDF5."""
 
 
 @inline
@@ -119,32 +120,31 @@ def _sums(y, points, predict, correct):
 
 
 def make_advance(form: StiffForm):
-    """Inline (y, points, formulas, p) -> as `solve`: from the eight points of a history, one after another, to the
-    ninth."""
+    """Inline (y, points, weights, p) -> what `solve` returns: the ninth point, from eight, oldest first."""
     solve, nodes = make_solve(form), {"predict": len(PREDICTOR_NODES), "correct": len(CORRECTOR_NODES)}
     sums = specialised(_sums, y=len(form.model.states), points=HISTORY * len(POINT), **nodes)
 
     @inline
-    def advance(y, points, formulas, p):
-        q, g, e, b = sums(y, points, formulas.predict, formulas.correct)
-        per_weight, gamma = formulas.per_weight, formulas.gamma
-        return solve(q, g, e, b, p, formulas.correct[0], per_weight, gamma, formulas.matrix)
+    def advance(y, points, weights, p):
+        q, g, e, b = sums(y, points, weights.predict, weights.correct)
+        per_weight, gamma = weights.per_weight, weights.gamma
+        return solve(q, g, e, b, p, weights.correct[0], per_weight, gamma, weights.matrix)
 
     return advance
 
 
-def make_formulas(arguments: str, at: Callable[[str], str]):
-    """Compiled (arguments) -> `Formulas`, of which `at` gives the expression of a quantity by its name."""
+def make_weights(arguments: str, at: Callable[[str], str]):
+    """Compiled (arguments) -> `Weights`; `at` gives the expression of a quantity by its name."""
     weights = (tuple_of(map(at, names)) for names in (PREDICT, CORRECT, MATRIX))
-    return make_gather(arguments, [*weights, at("per_weight"), at("gamma")], Formulas)
+    return make_gather(arguments, [*weights, at("per_weight"), at("gamma")], Weights)
 
 
 @cache
 def make_history(size: int):
     """The functions that read and extend a history, of which a point takes `size` numbers.
 
-    They are (history, first, lane) -> `POINT` of eight points in turn; and (history, at, lane, values) -> None, which
-    sets the `POINT` of one.
+    They are (history, first, lane) -> the `POINT` of eight points, one after another; and (history, first, lane,
+    values) -> None, which sets the `POINT` of the point at `first`.
     """
     places = [f"history[first + {i * LANES + j * size} + lane]" for j in range(HISTORY) for i in range(len(POINT))]
     return make_gather("history, first, lane", places), make_scatter("history, first, lane", places[: len(POINT)])

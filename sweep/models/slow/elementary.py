@@ -25,7 +25,7 @@ def exp(x):
 
 @inline
 def log1p(x):
-    """The logarithm of 1 + x, to 1 % for x up to 1e25, and too small beyond."""
+    """The logarithm of 1 + x, to 1 % for x up to 1e24, and too small beyond."""
     root = 1.0 + min(x, 1e200)
     for _ in range(5):
         root = np.sqrt(root)
@@ -35,7 +35,7 @@ def log1p(x):
 
 @inline
 def turn_by(phase):
-    """exp(i phase), to 1e-13: sin and 1 - cos of an eighth of the phase, doubled three times."""
+    """exp(i phase), to 1e-13 or the round-off of the phase: sin and 1 - cos of an eighth of it, doubled three times."""
     u = 0.125 * (phase - 2.0 * np.pi * np.floor(phase / (2.0 * np.pi) + 0.5))
     q = u * u
     sin = u * (1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * (1.0 - q / 110.0)))))

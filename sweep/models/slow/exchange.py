@@ -38,7 +38,7 @@ THIRD = np.array([(2, 0, 1, 0), (2, 0, 0, 1), (1, 1, 1, 0), (1, 1, 0, 1), (0, 2,
 RESONANT = 6
 """The first ones of `THIRD` turn as a_1 or a_2 do where the frequencies meet: they are the terms of T."""
 
-# How far apart in `THIRD` resonant products stand that act on each other by a' = C a; the others act on the next.
+# Distance in `THIRD` of resonant products that act on each other by a' = C a; the others act on their neighbours only.
 _APART = 2
 
 LOWEST, HIGHER, TERMS = 7, 19, 25
@@ -134,7 +134,7 @@ def _add(size, m, first, last, series):
 
 @called
 def _resolve(series, turns, first, last, sums):
-    """Sum a series over points times `turns`, of shape (points, 2 harmonics): real and imaginary parts of the first."""
+    """Sum a series over points times `turns`, of shape (points, 2 harmonics), for as many as `sums` has room for."""
     for m in range(len(sums)):
         sums[m] = 0.0
     for i in range(first, last):
@@ -362,16 +362,16 @@ def make_exchange(model: Model):
     def cubes(size, n, p, shape, inverse, q, linear, found, sums):
         """Terms of third order of x' in `found`, of shape (modes, products), and Q in `sums`, at an amplitude."""
         odd, even = np.empty(found.shape, inverse.dtype), np.empty(len(_EVEN), inverse.dtype)
-        cube, square, modes = size**3, size * size, range(len(found))
+        cube, energy, modes = size**3, size * size, range(len(found))
         harmonics((size, 0.0), n, p, shape, inverse, q, odd, even)
-        sums[19] = -(even[0] + sums[4] * square) / square**2
+        sums[19] = -(even[0] + sums[4] * energy) / energy**2
         for k in modes:
             found[k, 0] = (odd[k, 0] - size * linear[k, 0]) / cube
         harmonics((0.0, size), n, p, shape, inverse, q, odd, even)
-        sums[21] = -(even[0] + sums[5] * square) / square**2
+        sums[21] = -(even[0] + sums[5] * energy) / energy**2
         for k in modes:
             found[k, 5] = (odd[k, 5] - size * linear[k, 1]) / cube
-        size, cube, square = np.sqrt(0.5) * size, np.sqrt(0.125) * cube, 0.5 * square
+        size, cube, energy = np.sqrt(0.5) * size, np.sqrt(0.125) * cube, 0.5 * energy
         harmonics((size, size), n, p, shape, inverse, q, odd, even)
         for k in modes:
             first, second = found[k, 0], found[k, 5]
@@ -379,10 +379,10 @@ def make_exchange(model: Model):
                 found[k, m] = odd[k, m] / cube
             found[k, 0], found[k, 3] = first, found[k, 3] - size * linear[k, 0] / cube - first
             found[k, 5], found[k, 2] = second, found[k, 2] - size * linear[k, 1] / cube - second
-        sums[20] = -(even[0] + (sums[4] + sums[5]) * square) / square**2 - sums[19] - sums[21]
-        beats, sums[24] = -(even[1] + sums[6] * square) / square**2, -even[2] / square**2
+        sums[20] = -(even[0] + (sums[4] + sums[5]) * energy) / energy**2 - sums[19] - sums[21]
+        beats, sums[24] = -(even[1] + sums[6] * energy) / energy**2, -even[2] / energy**2
         harmonics((np.sqrt(1.6) * size, np.sqrt(0.4) * size), n, p, shape, inverse, q, odd, even)
-        sums[22] = -((even[1] / (0.8 * square) + sums[6]) / (2.0 * square) + 0.2 * beats) / 0.6
+        sums[22] = -((even[1] / (0.8 * energy) + sums[6]) / (2.0 * energy) + 0.2 * beats) / 0.6
         sums[23] = beats - sums[22]
 
     @called

@@ -4,8 +4,8 @@ Within a step the spin and the coefficients stay as they are in its middle.  The
 modes of a 2 × 2 matrix do, and their products, which drive the spin, are integrated exactly over the step.  So a step
 may be long compared with the beat of the modes, unless the beat is slow enough for T to act on it.
 
-Trajectories run side by side in lanes, whose steps are vector instructions.  A lane that has ended is computed with the
-others until the next one takes its place.
+Trajectories run side by side in lanes, whose steps are vector instructions.  A lane whose trajectory has ended is
+computed with the others until another trajectory takes its place.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sweep.models.slow.elementary import exp, log1p, turn_by
 from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS, quotient, square
 from sweep.models.stiff.final_spin import lasts
 
-# With 16 lanes a step takes a fifth longer, and with 64 more of them wait for the last ones.
+# With 16 lanes a step takes a fifth longer; with 64, more lanes are idle at the end.
 _LANES = 1 if INTERPRETED else 32
 
 # Steps between two looks at which lanes have ended.
@@ -71,7 +71,7 @@ def _put(rows, at, lane, z):
 
 @inline
 def _get_modes(g, lane):
-    """The amplitudes z_1 and z_2 of the modes V."""
+    """The amplitudes z_1 and z_2, and their modes V."""
     V = (_get(g, _V11, lane), _get(g, _V12, lane), _get(g, _V21, lane), _get(g, _V22, lane))
     return _get(g, _Z1, lane), _get(g, _Z2, lane), V
 
@@ -177,7 +177,10 @@ def _products(e1, e2, cross, V):
 
 @inline
 def _grown(step, rate1, rate2):
-    """What modes grow by in a step, and how far the phase between them turns; their common phase drives nothing."""
+    """Growth factors of both modes in a step, and exp(i φ) for the phase φ by which they part.
+
+    Their common phase drives nothing.
+    """
     phase = step * (rate1.imag - rate2.imag)
     return exp(step * rate1.real), exp(step * rate2.real), turn_by(phase)
 
@@ -241,10 +244,10 @@ def make_follow():
     size, slow : factors of T and Q, and of d: 1 but for tests of how much depends on them
     counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
 
-    Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (i ω_1 - i ω_2) at rest: the simulated
-    count is of the ripple-free spin.
+    Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (λ_1 + λ_2*) at rest, of which the part
+    that decays is left out: the simulated count is of the ripple-free spin.
     """
-    wide, load_sums = full_width(), _load_sums
+    wide = full_width()
 
     @called
     def coefficients(t, g, s):
@@ -265,7 +268,7 @@ def make_follow():
         """Count a reversal, choose a step, and find the spin in its middle."""
         wide()
         for lane in range(_LANES):
-            n, d, state, sums = g[_N + lane], g[_D + lane], g[_STATE + lane], load_sums(s, lane)
+            n, d, state, sums = g[_N + lane], g[_D + lane], g[_STATE + lane], _load_sums(s, lane)
             z1, z2, V = _get_modes(g, lane)
             e1, e2, beat = _products(square(z1), square(z2), _times(g[_KEEP + lane], z1 * np.conj(z2)), V)
             rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
@@ -297,7 +300,7 @@ def make_follow():
         """Take the step with the coefficients of its middle."""
         wide()
         for lane in range(_LANES):
-            sums, step, state, reach = load_sums(s, lane), g[_STEP + lane], g[_STATE + lane], g[_REACH + lane]
+            sums, step, state, reach = _load_sums(s, lane), g[_STEP + lane], g[_STATE + lane], g[_REACH + lane]
             e1, e2, beat = g[_E1 + lane], g[_E2 + lane], _get(g, _BETWEEN, lane)
             rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
             grown = _grown(step, rate1, rate2)
@@ -327,14 +330,15 @@ def make_follow():
         g[_D + lane], g[_BENT_RATES + lane], g[_BENT_TURN + lane] = slow * start[6], start[7], start[8]
         g[_SIZE + lane], g[_STRONG + lane] = size, size * np.sqrt(strong)
         g[_FAR_APART + lane] = 1.0 if table[0, 3].imag > 2.0 * table[0, 0].imag else 0.0
-        g[_REST + _LANES + lane] = -2.0 * table[0, 6].real / (table[0, 0] - table[0, 3]).imag
+        both = table[0, 0] + np.conj(table[0, 3])
+        g[_REST + _LANES + lane] = -2.0 * table[0, 6].real * both.imag / square(both)
 
     @called
     def follow(tables, starts, cells, size, slow, counts, over):
         g, t, s = np.zeros(_GROUP), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
         whose, following, begun = np.full(_LANES, -1), 0, 0
         g[_STATE : _STATE + _LANES] = _FAILED
-        while following or begun < len(cells):
+        while True:
             for lane in range(_LANES):
                 if g[_STATE + lane] != _RUNNING:
                     if whose[lane] >= 0:
@@ -344,6 +348,8 @@ def make_follow():
                         cell = cells[begun]
                         fill(g, t, lane, tables[cell], starts[cell], size, slow)
                         whose[lane], begun, following = cell, begun + 1, following + 1
+            if not following:
+                break
             for _ in range(_BLOCK):
                 coefficients(t, g, s)
                 begin(g, s)
