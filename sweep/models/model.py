@@ -110,7 +110,7 @@ class Tier:
     offers: frozenset[str]
     """What it offers, a selection of the names above, such as `COUNT`."""
     positive: frozenset[str] = frozenset()
-    """Parameters that must be at least 1e-300, although `sweep.parameters` allows zero."""
+    """Parameters by which the model divides, although `sweep.parameters` allows zero."""
     counts: str = "reversals"
     """The variable that its number of reversals is: for a tier that is not simulated, one of its predictions."""
     impossible: Callable[[Columns], Array] = lambda columns: zeros(columns).astype(bool)

@@ -86,6 +86,6 @@ def test_an_address_names_another_body(text: str, fault: str, source: Source, se
     assert found.changed == ({} if fault else {"delta": 0.05})
     assert fault in "".join(faults)
     again, faults = state.read({"with": ["delta:0.05,mu:7"]}, source, setup.base)
-    assert again.changed == ({"delta": 0.05})
+    assert again.changed == {"delta": 0.05}
     assert faults == ["with: mu varies in this file; only constant parameters can be changed"]
     assert "with=delta:0.05" in state.write(again, source, setup.base)

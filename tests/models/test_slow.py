@@ -258,8 +258,8 @@ def test_elementary_functions_are_those_of_numpy() -> None:
     np.testing.assert_allclose([elementary.exp(each) for each in x], np.exp(x), rtol=1e-12)
     np.testing.assert_allclose([elementary.exp(each) - 1.0 for each in small[:50]], np.expm1(small[:50]), atol=3e-16)
     np.testing.assert_allclose([elementary.turn_by(each) for each in x], np.exp(1j * x), atol=1e-13)
-    y = np.concatenate([-np.logspace(-12, -1e-9, 300), np.logspace(-12, 25, 300)])
-    np.testing.assert_allclose([elementary.log1p(each) for each in y], np.log1p(y), rtol=0.011)
+    y = np.concatenate([-np.logspace(-12, -1e-9, 300), np.logspace(-12, 24, 300)])
+    np.testing.assert_allclose([elementary.log1p(each) for each in y], np.log1p(y), rtol=0.01)
 
 
 @pytest.mark.x86

@@ -1,4 +1,4 @@
-"""Elementary functions of real numbers by arithmetic alone.
+"""Elementary functions by arithmetic alone.
 
 The compiler's own have branches, and a loop that calls one is not vectorised.
 """
@@ -8,6 +8,24 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import inline
+
+
+@inline
+def square(z):
+    """|z|², without the root that abs takes."""
+    return z.real * z.real + z.imag * z.imag
+
+
+@inline
+def times(x, z):
+    """A real number times a complex one, for which Numba would make the first one complex."""
+    return complex(x * z.real, x * z.imag)
+
+
+@inline
+def quotient(a, b):
+    """a/b of complex numbers, without the checks of a division."""
+    return times(1.0 / square(b), a * np.conj(b))
 
 
 @inline

@@ -26,8 +26,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.jit import called, inline
+from sweep.jit import called
 from sweep.models.model import Model
+from sweep.models.slow.elementary import quotient, square
 from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory.linear import NODES
 
@@ -102,18 +103,6 @@ _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 _FIT_OF_THREE = np.linalg.inv(NODES[:_THREE, None] ** np.arange(_THREE))
 _SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ _FIT
 """Takes values at `NODES` to the derivative there of the polynomial through them."""
-
-
-@inline
-def square(z):
-    """|z|², without the root that abs takes."""
-    return z.real * z.real + z.imag * z.imag
-
-
-@inline
-def quotient(a, b):
-    """a/b, without the checks of a complex division."""
-    return a * np.conj(b) * (1.0 / square(b))
 
 
 @called

@@ -14,8 +14,8 @@ import numpy as np
 
 from sweep.jit import INTERPRETED, called, full_width, inline
 from sweep.models.generated import compile_inline, tuple_of
-from sweep.models.slow.elementary import exp, log1p, turn_by
-from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS, quotient, square
+from sweep.models.slow.elementary import exp, log1p, quotient, square, times, turn_by
+from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS
 from sweep.models.stiff.final_spin import lasts
 
 # With 16 lanes a step takes a fifth longer; with 64, more lanes are idle at the end.
@@ -53,15 +53,15 @@ _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
 _RUNNING, _OVER_NOW, _FAILED = 0.0, 1.0, 2.0
 
-# (s, lane) -> all coefficients of a lane, one by one: a loop over them would need an array, and not be vectorised.
-_PLACES = (f"s[{k * _LANES} + lane]" for k in range(2 * TERMS))
-_SUMS = tuple_of(f"complex({real}, {imaginary})" for real, imaginary in zip(_PLACES, _PLACES, strict=True))
-_load_sums = compile_inline("load_sums", "s, lane", [f"return {_SUMS}"], {})
-
 
 @inline
 def _get(rows, at, lane):
     return complex(rows[at + lane], rows[at + _LANES + lane])
+
+
+# (s, lane) -> all coefficients of a lane, one by one: a loop over them would need an array, and not be vectorised.
+_SUMS = tuple_of(f"get(s, {at}, lane)" for at in range(0, 2 * TERMS * _LANES, 2 * _LANES))
+_load_sums = compile_inline("load_sums", "s, lane", [f"return {_SUMS}"], {"get": _get})
 
 
 @inline
@@ -87,21 +87,15 @@ def _put_modes(g, lane, z1, z2, V):
 
 
 @inline
-def _times(x, z):
-    """A real number times a complex one, for which Numba would make the first one complex."""
-    return complex(x * z.real, x * z.imag)
-
-
-@inline
 def _rates(sums, by, e1, e2, beat):
     """C with T, divided by `by`, for products of the amplitudes: e_1, e_2 and `beat`, which is a_1 a_2*."""
     back = np.conj(beat)
     share = 1.0 / by  # a complex division would have to check for zero
     return (
-        sums[0] + _times(share, _times(e1, sums[7]) + sums[8] * beat + _times(e2, sums[10])),
-        sums[1] + _times(share, _times(e1, sums[9]) + sums[11] * back + _times(e2, sums[12])),
-        sums[2] + _times(share, _times(e1, sums[13]) + sums[14] * beat + _times(e2, sums[16])),
-        sums[3] + _times(share, _times(e1, sums[15]) + sums[17] * back + _times(e2, sums[18])),
+        sums[0] + times(share, times(e1, sums[7]) + sums[8] * beat + times(e2, sums[10])),
+        sums[1] + times(share, times(e1, sums[9]) + sums[11] * back + times(e2, sums[12])),
+        sums[2] + times(share, times(e1, sums[13]) + sums[14] * beat + times(e2, sums[16])),
+        sums[3] + times(share, times(e1, sums[15]) + sums[17] * back + times(e2, sums[18])),
     )
 
 
@@ -109,7 +103,7 @@ def _rates(sums, by, e1, e2, beat):
 def _turning(sums, by, e1, e2, beat):
     """n' with Q, divided by `by`."""
     pairs = sums[19].real * e1 * e1 + sums[20].real * e1 * e2 + sums[21].real * e2 * e2
-    pairs += 2.0 * ((_times(e1, sums[22]) + _times(e2, sums[23]) + sums[24] * beat) * beat).real
+    pairs += 2.0 * ((times(e1, sums[22]) + times(e2, sums[23]) + sums[24] * beat) * beat).real
     return sums[4].real * e1 + sums[5].real * e2 + 2.0 * (sums[6] * beat).real + pairs / by
 
 
@@ -125,22 +119,21 @@ def _root(z):
 def _modes(C):
     """Eigenvalues and eigenvectors of a 2 × 2 matrix, (λ_1, λ_2, (V_11, V_12, V_21, V_22))."""
     c11, c12, c21, c22 = C
-    middle, half = _times(0.5, c11 + c22), _times(0.5, c11 - c22)
+    middle, half = times(0.5, c11 + c22), times(0.5, c11 - c22)
     root, least = half * half + c12 * c21, _APART**2 * (square(c12) + square(c21) + square(half))
     apart = square(root) > least * least
     root = _root(complex(root.real if apart else least, root.imag if apart else 0.0))
     sign = 1.0 if half.real * root.real + half.imag * root.imag >= 0.0 else -1.0
-    root = _times(sign, root)
+    root = times(sign, root)
     big = half + root
     by1, by2 = 1.0 / np.sqrt(square(big) + square(c21) + _TINY), 1.0 / np.sqrt(square(big) + square(c12) + _TINY)
-    return middle + root, middle - root, (_times(by1, big), _times(-by2, c12), _times(by1, c21), _times(by2, big))
+    return middle + root, middle - root, (times(by1, big), times(-by2, c12), times(by1, c21), times(by2, big))
 
 
 @inline
 def _turned(z1, z2, V, W, keep):
     """Amplitudes z of the modes V as those of the modes W; with `keep` = 0, each mode keeps to itself."""
-    determinant = W[0] * W[3] - W[1] * W[2]
-    by = _times(1.0 / square(determinant), np.conj(determinant))
+    by = quotient(1.0, W[0] * W[3] - W[1] * W[2])
     first = z1 * (W[3] * V[0] - W[1] * V[2]) + keep * z2 * (W[3] * V[1] - W[1] * V[3])
     return by * first, by * (keep * z1 * (W[0] * V[2] - W[2] * V[0]) + z2 * (W[0] * V[3] - W[2] * V[1]))
 
@@ -171,7 +164,7 @@ def _products(e1, e2, cross, V):
     """|a_1|², |a_2|² and a_1 a_2*, from the same products of the amplitudes of the modes V."""
     first = square(V[0]) * e1 + square(V[1]) * e2 + 2.0 * (V[0] * np.conj(V[1]) * cross).real
     second = square(V[2]) * e1 + square(V[3]) * e2 + 2.0 * (V[2] * np.conj(V[3]) * cross).real
-    beat = _times(e1, V[0] * np.conj(V[2])) + _times(e2, V[1] * np.conj(V[3]))
+    beat = times(e1, V[0] * np.conj(V[2])) + times(e2, V[1] * np.conj(V[3]))
     return first, second, beat + V[0] * np.conj(V[3]) * cross + V[1] * np.conj(V[2]) * np.conj(cross)
 
 
@@ -191,7 +184,7 @@ def _means(z1, z2, step, rate1, rate2, grown, V):
     g1, g2, turned = grown
     e1 = square(z1) * _real_mean(g1 * g1, 2.0 * step * rate1.real)
     e2 = square(z2) * _real_mean(g2 * g2, 2.0 * step * rate2.real)
-    return _products(e1, e2, z1 * np.conj(z2) * _mean(_times(g1 * g2, turned), _times(step, rate1 + np.conj(rate2))), V)
+    return _products(e1, e2, z1 * np.conj(z2) * _mean(times(g1 * g2, turned), times(step, rate1 + np.conj(rate2))), V)
 
 
 @inline
@@ -200,7 +193,7 @@ def _turns(sums, V):
     h1, h2, h12 = sums[4].real, sums[5].real, sums[6]
     one = h1 * square(V[0]) + h2 * square(V[2]) + 2.0 * (h12 * V[0] * np.conj(V[2])).real
     other = h1 * square(V[1]) + h2 * square(V[3]) + 2.0 * (h12 * V[1] * np.conj(V[3])).real
-    both = _times(h1, V[0] * np.conj(V[1])) + _times(h2, V[2] * np.conj(V[3]))
+    both = times(h1, V[0] * np.conj(V[1])) + times(h2, V[2] * np.conj(V[3]))
     both += h12 * V[0] * np.conj(V[3]) + np.conj(h12) * V[2] * np.conj(V[1])
     return one, other, both
 
@@ -270,7 +263,7 @@ def make_follow():
         for lane in range(_LANES):
             n, d, state, sums = g[_N + lane], g[_D + lane], g[_STATE + lane], _load_sums(s, lane)
             z1, z2, V = _get_modes(g, lane)
-            e1, e2, beat = _products(square(z1), square(z2), _times(g[_KEEP + lane], z1 * np.conj(z2)), V)
+            e1, e2, beat = _products(square(z1), square(z2), times(g[_KEEP + lane], z1 * np.conj(z2)), V)
             rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
             f1, f2, r1, r2, apart = square(z1), square(z2), rate1.real, rate2.real, abs(rate1.imag - rate2.imag)
             (g1, g2, g12), both, running = _turns(sums, V), rate1 + np.conj(rate2), state == _RUNNING
@@ -310,7 +303,7 @@ def make_follow():
             fails = (not abs(n) < _FAR * reach) | (steps >= _MOST_STEPS)
             g[_STATE + lane] = _FAILED if (state == _RUNNING) & fails else state
             g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n / reach, steps
-            _put_modes(g, lane, _times(grown[0], z1), _times(grown[1], z2) * np.conj(grown[2]), V)
+            _put_modes(g, lane, times(grown[0], z1), times(grown[1], z2) * np.conj(grown[2]), V)
 
     @called
     def fill(g, t, lane, table, start, size, slow):

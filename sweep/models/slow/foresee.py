@@ -120,10 +120,8 @@ def compiled_foresee(model: Model) -> Cached:
             follow(tables, starts, cells[:some], tests[k, 0], tests[k, 1], counts, over)
             for i in cells[:some]:
                 if k == 0:
-                    found[i, 0], found[i, 1] = counts[i], over[i]
+                    found[i, 0], found[i, 1] = counts[i], over[i] if check else 0.0
                 elif counts[i] != found[i, 0]:
                     found[i, 1] = 0.0
-        if not check:
-            found[:, 1] = 0.0
 
     return serial(run, "(f8[:, ::1], c16[:, :, ::1], c16[:, :, ::1], b1, f8[:, ::1])", f"foreseen-{model.key}")
