@@ -31,10 +31,9 @@ def test_the_matrix_has_the_eigenvalues_of_the_full_model() -> None:
         body = columns(b=b)
         p = slip.MODEL.constants.of(body)
         _, modes = slow._modes_at_rest(slip.MODEL, p)
-        E = slow._of_unit_energy(slip.MODEL, p, modes)[0]
-        exchange, _ = make_exchange(slip.MODEL)
-        table, reach = np.empty((5, TERMS), complex), 0.05
-        exchange(type(p)(*(each[0] for each in p)), E, np.linalg.inv(E), reach, table, np.empty(2))
+        reach, (exchange, _), table = 0.05, make_exchange(slip.MODEL), np.empty((5, TERMS), complex)
+        E = reach * slow._of_unit_energy(slip.MODEL, p, modes)[0]
+        exchange(type(p)(*(each[0] for each in p)), reach, E, np.linalg.inv(E), table, np.empty(2))
         for x in (0.3, -0.8):
             C = (table[:, :4].T @ x ** np.arange(5)).reshape(2, 2)
             full = np.linalg.eigvals(linear.jacobian(slip.MODEL, p, np.array([x * reach])))[0]
@@ -232,8 +231,10 @@ def test_orders_of_the_corrections(b: float) -> None:
     w = f / (THIRD @ turning - at_rest[:, None])
 
     def left_over(size: float) -> np.ndarray:
-        table, kappa, a = np.empty((5, TERMS), complex), np.empty(2), size * unit
-        exchange(p, E, inverse, 1.02 * np.sqrt(2) * size, table, kappa)
+        table, kappa, a, reach = np.empty((5, TERMS), complex), np.empty(2), size * unit, 1.02 * np.sqrt(2) * size
+        exchange(p, reach, reach * E, inverse / reach, table, kappa)
+        table /= reach ** np.repeat([0, 1, 2, 3], [4, 3, 12, 6])
+        kappa /= reach**2
         e1, e2, beat, true = abs(a[0]) ** 2, abs(a[1]) ** 2, a[0] * a[1].conj(), slopes(a, q, w)
         found = []
         for share in (1e-12, 1.0):

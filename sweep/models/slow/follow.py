@@ -47,9 +47,9 @@ _FAR = 3.0
 _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
 # Where the lanes of each quantity begin in a group; complex numbers take two rows.
-(_Z1, _Z2, _V11, _V12, _V21, _V22, _REST, _BETWEEN, _N, _OLD, _COUNT, _KEEP, _STEP, _STEPS, _STATE, _REACH, _SIZE, _D,
+(_Z1, _Z2, _V11, _V12, _V21, _V22, _REST, _BETWEEN, _N, _OLD, _COUNT, _KEEP, _STEP, _STEPS, _STATE, _SIZE, _D,
  _STRONG, _FAR_APART, _BENT_RATES, _BENT_TURN, _E1, _E2, _X, _GROUP) = (
-    _LANES * row for row in (*range(0, 16, 2), *range(16, 34)))  # fmt: skip
+    _LANES * row for row in (*range(0, 16, 2), *range(16, 33)))  # fmt: skip
 
 _RUNNING, _OVER_NOW, _FAILED = 0.0, 1.0, 2.0
 
@@ -232,7 +232,7 @@ def make_follow():
     Parameters
     ----------
     tables : the coefficients of `sweep.models.slow.exchange`, of all cells
-    starts : of all cells, shape (cells, 9): real and imaginary parts of a_1 and a_2, n, the fastest spin, d, the two κ
+    starts : of all cells, shape (cells, 8): real and imaginary parts of a_1 and a_2, n, d, and the two κ
     cells : which of them to follow
     size, slow : factors of T and Q, and of d: 1 but for tests of how much depends on them
     counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
@@ -284,7 +284,7 @@ def make_follow():
             middle = (n + 0.5 * step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-0.5 * d * step)
             grown = (grown[0] * grown[0], grown[1] * grown[1], grown[2] * grown[2])
             g[_E1 + lane], g[_E2 + lane], beat = _means(z1, z2, step, rate1, rate2, grown, V)
-            g[_X + lane] = middle / g[_REACH + lane]
+            g[_X + lane] = middle
             _put(g, _BETWEEN, lane, beat)
             _put_modes(g, lane, z1, z2, V)
 
@@ -293,16 +293,16 @@ def make_follow():
         """Take the step with the coefficients of its middle."""
         wide()
         for lane in range(_LANES):
-            sums, step, state, reach = _load_sums(s, lane), g[_STEP + lane], g[_STATE + lane], g[_REACH + lane]
+            sums, step, state = _load_sums(s, lane), g[_STEP + lane], g[_STATE + lane]
             e1, e2, beat = g[_E1 + lane], g[_E2 + lane], _get(g, _BETWEEN, lane)
             rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
             grown = _grown(step, rate1, rate2)
             e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
             n = (g[_N + lane] + step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-g[_D + lane] * step)
             steps = g[_STEPS + lane] + 1.0
-            fails = (not abs(n) < _FAR * reach) | (steps >= _MOST_STEPS)
+            fails = (not abs(n) < _FAR) | (steps >= _MOST_STEPS)
             g[_STATE + lane] = _FAILED if (state == _RUNNING) & fails else state
-            g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n / reach, steps
+            g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n, steps
             _put_modes(g, lane, times(grown[0], z1), times(grown[1], z2) * np.conj(grown[2]), V)
 
     @called
@@ -319,8 +319,8 @@ def make_follow():
         _put(g, _Z1, lane, complex(start[0], start[1]))
         _put(g, _Z2, lane, complex(start[2], start[3]))
         g[_V11 + lane] = g[_V22 + lane] = g[_KEEP + lane] = 1.0
-        g[_N + lane], g[_X + lane], g[_REACH + lane] = start[4], start[4] / start[5], start[5]
-        g[_D + lane], g[_BENT_RATES + lane], g[_BENT_TURN + lane] = slow * start[6], start[7], start[8]
+        g[_N + lane], g[_X + lane], g[_D + lane] = start[4], start[4], slow * start[5]
+        g[_BENT_RATES + lane], g[_BENT_TURN + lane] = start[6], start[7]
         g[_SIZE + lane], g[_STRONG + lane] = size, size * np.sqrt(strong)
         g[_FAR_APART + lane] = 1.0 if table[0, 3].imag > 2.0 * table[0, 0].imag else 0.0
         both = table[0, 0] + np.conj(table[0, 3])

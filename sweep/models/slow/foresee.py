@@ -14,7 +14,6 @@ from sweep.models.slow.exchange import TERMS, make_exchange
 from sweep.models.slow.follow import make_follow
 from sweep.models.stiff.modes import RATTLE, SLIP_DECAY
 from sweep.models.stiff.slip import form_of
-from sweep.models.theory import linear
 
 # The fastest spin within reach, in units of the spin that has all the energy.
 _REACH = 1.02
@@ -61,8 +60,8 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     some = np.flatnonzero(sound & np.isfinite(reach))
     if not len(some):
         return result
-    E = _of_unit_energy(model, take(p, some), E[some])
-    rows = np.concatenate([stack((*p, -states[model.spin_state], reach)), states[list(RATTLE)]])[:, some]
+    E = reach[some, None, None] * _of_unit_energy(model, take(p, some), E[some])
+    rows = np.concatenate([stack((*p, -states[model.spin_state] / reach, reach)), states[list(RATTLE)]])[:, some]
     found = np.empty((len(some), 2))
     compiled_foresee(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), check, found)
     slower, faster = rates[some, :2].imag.T
@@ -75,7 +74,11 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
 
 def _modes_at_rest(model: Model, p: Any) -> tuple[Array, Array]:
     """Rates and modes: the slower rocking, the faster one, their conjugates, and the decay of the slip."""
-    rates, modes = np.linalg.eig(linear.jacobian(model, p, np.zeros_like(p[0])))
+    rattle = list(RATTLE)
+    states = np.zeros((len(model.states), len(rattle), len(p[0])))
+    states[rattle, range(len(rattle))] = _SMALL
+    slopes = stack(model.rhs(states, p)[0])[rattle] / _SMALL  # exact, because the equations are odd in the rattle
+    rates, modes = np.linalg.eig(np.moveaxis(slopes, -1, 0))
     order = np.argsort(-rates.imag, axis=1)[:, [1, 0, 4, 5, 2, 3]]
     return np.take_along_axis(rates, order, axis=1), np.take_along_axis(modes, order[:, None, :], axis=2)
 
@@ -102,20 +105,20 @@ def compiled_foresee(model: Model) -> Cached:
 
     def run(rows, E, inverse, check, found):
         size = len(rows)
-        tables, starts, bent = np.empty((size, 5, TERMS), E.dtype), np.empty((size, 9)), np.empty(2)
+        tables, starts, bent = np.empty((size, 5, TERMS), E.dtype), np.empty((size, 8)), np.empty(2)
         for i in range(size):
             p, spin, reach = load(rows[i]), rows[i, n], rows[i, n + 1]
-            d = exchange(p, E[i], inverse[i], reach, tables[i], bent)
-            a1, a2, spin = begin(rows[i, n + 2 :], spin, reach, p, E[i], inverse[i])
-            start = (a1.real, a1.imag, a2.real, a2.imag, spin, reach, d, bent[0], bent[1])
-            for k in range(9):
+            d = exchange(p, reach, E[i], inverse[i], tables[i], bent)
+            a1, a2, spin = begin(rows[i, n + 2 :], spin, p, reach, E[i], inverse[i])
+            start = (a1.real, a1.imag, a2.real, a2.imag, spin, d, bent[0], bent[1])
+            for k in range(8):
                 starts[i, k] = start[k]
             found[i, 1] = 1.0
         counts, over, cells = np.empty(size), np.empty(size), np.empty(size, np.int64)
         for k in range(len(tests) if check else 1):
             some = 0
             for i in range(size):
-                if found[i, 1] > 0.0 and (k < 3 or starts[i, 6] > 0.0):
+                if found[i, 1] > 0.0 and (k < 3 or starts[i, 5] > 0.0):
                     cells[some], some = i, some + 1
             follow(tables, starts, cells[:some], tests[k, 0], tests[k, 1], counts, over)
             for i in cells[:some]:
