@@ -116,8 +116,8 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         with all_threads():
             values = foreseen(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
         found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
-        yield (last := labelled())
-        yield from _resting(last)
+        yield labelled()
+    yield from _resting(labelled())
     for spread in _SPREADS:
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[possible[some] & ~simulated[some]]
