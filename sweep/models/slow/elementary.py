@@ -9,6 +9,9 @@ import numpy as np
 
 from sweep.jit import inline
 
+_LOG_2 = np.log(2.0)
+_ROOT_OF_HALF = np.float64(np.sqrt(0.5)).view(np.int64)
+
 
 @inline
 def square(z):
@@ -43,12 +46,12 @@ def exp(x):
 
 @inline
 def log1p(x):
-    """The logarithm of 1 + x, to 1 % for x up to 1e24, and too small beyond."""
-    root = 1.0 + min(x, 1e200)
-    for _ in range(5):
-        root = np.sqrt(root)
-    z = (root - 1.0) / (root + 1.0)
-    return 64.0 * z * (1.0 + z * z * (1.0 / 3.0 + z * z * (1.0 / 5.0 + z * z / 7.0)))
+    """The logarithm of 1 + x, to 1 % for x up to 1e300: its exponent, and a fraction from 0.7 to 1.4."""
+    bits = np.float64(1.0 + x).view(np.int64)
+    power = (bits - _ROOT_OF_HALF) >> 52
+    fraction = np.int64(bits - (power << 52)).view(np.float64)
+    z = (fraction - 1.0) / (fraction + 1.0)
+    return _LOG_2 * power + 2.0 * z * (1.0 + z * z / 3.0)
 
 
 @inline

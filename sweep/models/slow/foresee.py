@@ -58,6 +58,7 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     decay = SLIP_DECAY * form_of(model).unit(p)
     sound = (rates[:, :2].imag > 0).all(axis=1) & (rates[:, 4:].real < -decay[:, None]).all(axis=1) & (reach > 0)
     some = np.flatnonzero(sound & np.isfinite(reach))
+    some = some[np.argsort(-reach[some])]  # the longest runs begin first, so that fewer lanes are idle at the end
     if not len(some):
         return result
     E = reach[some, None, None] * _of_unit_energy(model, take(p, some), E[some])
