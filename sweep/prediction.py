@@ -20,7 +20,7 @@ from sweep.models.slow.foresee import foresee
 from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
 
-# Most cells that a thread foresees at once.  A cell takes 0.2 ms; while the last ones finish, lanes are idle.
+# Most cells that a thread foresees at once.  A cell takes 0.1 ms; while the last ones finish, lanes are idle.
 _SOME = 512
 
 # Bodies whose eigenvalues are found at once (about 60 MB); a body takes 0.1 ms.

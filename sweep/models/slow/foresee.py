@@ -19,7 +19,7 @@ from sweep.models.stiff.slip import form_of
 _REACH = 1.02
 
 # A count is sure if terms of higher order that are smaller and larger by these factors leave it as it is: of 5901 cells
-# of `mu_b` 63 % are, two of them falsely; with 0.8 and 1.25, 69 % of every fifth cell, two of 818 falsely.
+# of `mu_b` 63 % are, four of them falsely; with 0.8 and 1.25, 69 % of every fifth cell, two of 818 falsely.
 # With a couple, d at these factors has to leave it as well: for 1/d the spin lingers above the critical one, and a tiny
 # mode grows or does not.
 _LESS, _MORE = 0.7, 1.4
@@ -45,7 +45,7 @@ class Foreseen(NamedTuple):
 def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     """Count the reversals of trajectories by the slow equations of `model`, which has two rocking modes (`ENDING`).
 
-    Without `check`, no count is sure, and it takes two thirds of the time, or half with a couple.
+    Without `check`, no count is sure, and it takes three fifths of the time, or less with a couple.
     """
     size = len(next(iter(columns.values())))
     result = Foreseen(np.zeros(size, np.int16), np.zeros(size, bool))
