@@ -227,14 +227,14 @@ def _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
 
 
 def make_follow():
-    """Compiled (tables, starts, cells, size, slow, counts, over) -> None: follows the slow equations of `cells`.
+    """Compiled (tables, starts, cells, size, slow, pace, counts, over) -> None: follows the slow equations of `cells`.
 
     Parameters
     ----------
     tables : the coefficients of `sweep.models.slow.exchange`, of all cells
     starts : of all cells, shape (cells, 8): real and imaginary parts of a_1 and a_2, n, d, and the two κ
     cells : which of them to follow
-    size, slow : factors of T and Q, and of d: 1 but for tests of how much depends on them
+    size, slow, pace : factors of T and Q, of d, and of the steps: 1 but for tests of how much depends on them
     counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
 
     Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (λ_1 + λ_2*) at rest, of which the part
@@ -257,7 +257,7 @@ def make_follow():
                 s[k * _LANES + lane] = (t[2, k, lane] * x + t[1, k, lane]) * x + t[0, k, lane]
 
     @called
-    def begin(g, s):
+    def begin(g, s, pace):
         """Count a reversal, choose a step, and find the spin in its middle."""
         wide()
         for lane in range(_LANES):
@@ -277,7 +277,7 @@ def make_follow():
             over = (r1 < 0.0) & (r2 < 0.0) & (others + beating < _OVER * lasting)
             g[_STATE + lane] = _OVER_NOW if running & over else state
             left = 0.5 * h1 * f1 / abs(r1) + 0.5 * h2 * f2 / abs(r2) + beating
-            step = _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, g[_STRONG + lane])
+            step = pace * _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, g[_STRONG + lane])
             g[_STEP + lane], g[_KEEP + lane] = step, 0.0 if apart * step > _APART_STEP else 1.0
             grown = _grown(0.5 * step, rate1, rate2)
             e1, e2, beat = _means(z1, z2, 0.5 * step, rate1, rate2, grown, V)
@@ -327,7 +327,7 @@ def make_follow():
         g[_REST + _LANES + lane] = -2.0 * table[0, 6].real * both.imag / square(both)
 
     @called
-    def follow(tables, starts, cells, size, slow, counts, over):
+    def follow(tables, starts, cells, size, slow, pace, counts, over):
         g, t, s = np.zeros(_GROUP), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
         whose, following, begun = np.full(_LANES, -1), 0, 0
         g[_STATE : _STATE + _LANES] = _FAILED
@@ -345,7 +345,7 @@ def make_follow():
                 break
             for _ in range(_BLOCK):
                 coefficients(t, g, s)
-                begin(g, s)
+                begin(g, s, pace)
                 coefficients(t, g, s)
                 end(g, s)
 
