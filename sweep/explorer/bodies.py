@@ -34,7 +34,7 @@ _COARSE, _SPREADS = 4, (4, 2, 1)
 """The first map has every fourth value along each axis; simulated cells fill a map in this order."""
 
 _REST = 0.3
-"""Seconds for which the sliders must rest before more cells are foreseen or simulated, which slows the page."""
+"""Seconds for which the sliders must rest before cells are simulated, which slows the page."""
 
 _TOGETHER = 256
 """Cells that are simulated together; between them the page's trajectories go on."""
@@ -116,8 +116,8 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         with all_threads():
             values = foreseen(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
         found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
-        yield labelled()
-    yield from _resting(labelled())
+        yield (last := labelled())
+    yield from _resting(last)
     for spread in _SPREADS:
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[possible[some] & ~simulated[some]]

@@ -12,9 +12,9 @@ where Y has no part along the rocking modes, w is cubic in a and its conjugate, 
 up to terms of order |a|⁵ and |a|⁶.  With the Jacobian A of the full model at the spin n, A (1 + Y) = (1 + Y) C, so that
 C has the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2): their
 harmonics that do not turn with a mode, divided by their rates, which is exact at rest.  That the spin mixes the modes
-while they turn is left out of these two: with it, the same share of counts of random bodies is right.  Unlike modes at
-n, all these are smooth functions of n where the two frequencies meet.  C and H are computed at five spins, T and Q at
-three, with polynomials between them.
+while they turn is left out of these two: with it, as many counts of random bodies are right, and 2 % more of `mu_b` at
+n0 = 0.1.  Unlike modes at n, all these are smooth functions of n where the two frequencies meet.  C and H are computed
+at five spins, T and Q at three, with polynomials between them.
 
 The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory
 reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
@@ -53,8 +53,8 @@ _RIPPLE, _CUBIC, _USUAL, _LARGE = range(4)
 
 # Points where the equations are evaluated, by phases of both modes in eighths of a turn and by their shares of the
 # energy: the first mode alone, the second alone, both alike, and both unlike, which only Q needs.  The second mode
-# takes half a turn, because the equations are odd.  On a lattice, half as many points would resolve the same harmonics,
-# but take the next ones for them: 2 % fewer counts of `mu_b` at n0 = 0.1 were right.
+# takes half a turn, because the equations are odd.  On a lattice, 20 points would resolve the same harmonics as the 32
+# of a torus, but take the next ones for them: 2 % fewer counts of `mu_b` at n0 = 0.1 were right.
 _LINE, _TORUS = [(k, k) for k in range(4)], [*np.ndindex(8, 4)]
 _PHASES = np.array([*_LINE, *_LINE, *_TORUS, *_TORUS])
 _SHARES = np.repeat([(1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.8, 0.2)], [4, 4, 32, 32], axis=0)
@@ -63,7 +63,7 @@ _FEW, _ALL = 40, 72
 
 
 def _in_parts(columns: np.ndarray) -> np.ndarray:
-    """Complex columns as real parts and imaginary parts in turn."""
+    """Return complex columns as real and imaginary parts in turn."""
     return np.asarray(columns.view(float))
 
 
@@ -79,14 +79,14 @@ def _waves(size: float) -> np.ndarray:
 
 
 def _harmonic(first: int, second: int, where: slice) -> np.ndarray:
-    """Weights of the points in a sum that is a harmonic of both phases."""
+    """Return the weights of the points in a sum that is a harmonic of both phases."""
     weights = np.zeros(len(_PHASES), complex)
     weights[where] = np.exp(-2j * np.pi / 8 * (_PHASES[where] @ (first, second))) / len(weights[where])
     return weights
 
 
 def _of_x(size: float) -> np.ndarray:
-    """Weights of x' at the points: terms of third order, in which linear ones are left, shape (72, 20)."""
+    """Return weights of x' at the points that give terms of third order, with linear ones left in, shape (72, 20)."""
     alone, other_alone = 2**-1.5 * _harmonic(1, 0, _FIRST), 2**-1.5 * _harmonic(0, 1, _SECOND)
     both, other_of_both = _harmonic(1, 0, _ALIKE) - alone, _harmonic(0, 1, _ALIKE) - other_alone
     turning = [_harmonic(*each, _ALIKE) for each in ((2, -1), (-1, 2), (3, 0), (2, 1), (1, 2), (0, 3))]
@@ -95,7 +95,7 @@ def _of_x(size: float) -> np.ndarray:
 
 
 def _of_spin(size: float) -> np.ndarray:
-    """Weights of ω3' at the points: the terms of Q, in which H is left, shape (72, 12)."""
+    """Return weights of ω3' at the points that give the terms of Q, with H left in, shape (72, 12)."""
     first, second, both = (_harmonic(0, 0, where) for where in (_FIRST, _SECOND, _ALIKE))
     beats, unlike = 4 * _harmonic(1, -1, _ALIKE), _harmonic(1, -1, _UNLIKE) / 0.4
     of_first = (unlike - 0.2 * beats) / 0.6
@@ -104,7 +104,7 @@ def _of_spin(size: float) -> np.ndarray:
 
 
 def _of_tiny(size: float) -> np.ndarray:
-    """Weights of ω3' at the points: H, and -ω3' as it turns with products of second order, shape (72, 12)."""
+    """Return weights of ω3' that give H, and -ω3' as it turns with products of second order, shape (72, 12)."""
     both = [2 * _harmonic(*each, _ALIKE) for each in ((1, -1), (2, 0), (1, 1), (0, 2))]
     return _in_parts(np.stack([_harmonic(0, 0, _FIRST), _harmonic(0, 0, _SECOND), *both], axis=1) / -(size**2))
 
@@ -190,7 +190,6 @@ def _follow_modes(A, Y, C):
         _product(A[:2, 2:], Y, C)
         for j in range(2):
             C[0, j], C[1, j] = C[0, j] + A[0, j], C[1, j] + A[1, j]
-        for j in range(2):
             for i in range(4):
                 for k in range(4):
                     M[i, k] = A[i + 2, k + 2]
@@ -236,7 +235,7 @@ def _without_linear(share, linear, found):
 
 @called
 def _bend(sums, large, bent):
-    """κ of T and of Q, from their values at the usual amplitude and at a large one."""
+    """Find κ of T and of Q from their values at the usual amplitude and at a large one."""
     squares = np.zeros((2, 2))
     for m in range(LOWEST, TERMS):
         squares[0, m // HIGHER] += square(sums[m])
@@ -256,7 +255,7 @@ def make_exchange(model: Model):
 
     @called
     def slopes_of(x, n, p, reach, slopes):
-        """The slopes of rattles and of ω3 about the spin n, both of shape (7, states): in the order of `RATTLE`."""
+        """Write the slopes at a spin n; rows of `x` and `slopes` are the rattle in the order of `RATTLE`, then ω3."""
         for i in range(x.shape[1]):
             state = x[0, i], x[1, i], x[2, i], x[3, i], (x[6, i] - n) * reach, x[4, i], x[5, i]
             rates, _ = rhs(state, p)
@@ -272,7 +271,7 @@ def make_exchange(model: Model):
     @called
     def jacobian(n, p, reach, E, inverse, A):
         """A in the modes at rest, from real and imaginary parts of E that are so small that nothing else is left."""
-        x, slopes, by_mode = np.zeros((7, 16)), np.empty((7, 16)), np.empty((6, 12))
+        x, slopes, by_mode = np.zeros((7, 12)), np.empty((7, 12)), np.empty((6, 12))
         parts, tiny = E.view(np.float64), _SIZES[_RIPPLE] ** 2
         for i in range(6):
             for k in range(12):
@@ -303,7 +302,7 @@ def make_exchange(model: Model):
 
     @called
     def linear_terms(n, p, reach, E, C, Y, small, q, sums):
-        """C, H and the ripple at one spin; `small` gets E (1 + Y)."""
+        """Find C, H and the ripple at one spin; `small` gets E (1 + Y)."""
         basis, of_spin = np.zeros((6, 2), E.dtype), np.empty(6, E.dtype)
         for i in range(2):
             basis[i, i], q[i], q[2] = 1.0, 0.0, 0.0
@@ -318,7 +317,7 @@ def make_exchange(model: Model):
 
     @called
     def resonances(level, n, p, reach, inverse, shape, q, linear, sums):
-        """T and Q at an amplitude."""
+        """Find T and Q at an amplitude."""
         of_x, found = np.empty((6, RESONANT), inverse.dtype), np.empty((2, RESONANT), inverse.dtype)
         of_spin, per = sums[HIGHER:], _SIZES[level] ** -2
         evaluate(level, _ALL, n, p, reach, shape, q, of_x, of_spin)
@@ -332,7 +331,7 @@ def make_exchange(model: Model):
 
     @called
     def higher_terms(n, p, reach, E, inverse, A, C, Y, slope, small, q, linear, shape, sums):
-        """T and Q at one spin; `slope` is the derivative of Y by n, and `shape` gets E (1 + Y + w)."""
+        """Find T and Q at one spin; `slope` is the derivative of Y by n, and `shape` gets E (1 + Y + w)."""
         of_x, of_spin, found = np.empty((6, 10), E.dtype), np.empty(6, E.dtype), np.empty((6, 10), E.dtype)
         for i in range(2):
             for k in range(6):
@@ -378,10 +377,8 @@ def make_exchange(model: Model):
                 _bend(sums[0], large, bent)
         _clear(table)
         for m in range(TERMS):
-            if m < LOWEST:
-                fit, straight = _FIT, 1.0
-            else:
-                fit, straight = _FIT_OF_THREE, 1.0 + bent[m // HIGHER] * _SIZES[_USUAL] ** 2
+            fit = _FIT if m < LOWEST else _FIT_OF_THREE
+            straight = 1.0 if m < LOWEST else 1.0 + bent[m // HIGHER] * _SIZES[_USUAL] ** 2
             for k in range(len(fit)):
                 for j in range(len(fit)):
                     table[k, m] += straight * fit[k, j] * sums[j, m]

@@ -31,7 +31,7 @@ _LONGER, _SHORTER = 1.1, 0.9
 # has to lie below 3 by this share.
 _BELOW_THREE = 0.3
 
-# Amplitude at which energies are evaluated.
+# Amplitude at which energies and the modes at rest are evaluated.
 _SMALL = 1e-8
 
 
@@ -63,8 +63,9 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     some = some[np.argsort(-reach[some])]  # the longest runs begin first, so that fewer lanes are idle at the end
     if not len(some):
         return result
-    E = reach[some, None, None] * _of_unit_energy(model, take(p, some), E[some])
-    rows = np.concatenate([stack((*p, -states[model.spin_state] / reach, reach)), states[list(RATTLE)]])[:, some]
+    p, states, reach = take(p, some), states[:, some], reach[some]
+    E = reach[:, None, None] * _of_unit_energy(model, p, E[some])
+    rows = np.concatenate([stack((*p, -states[model.spin_state] / reach, reach)), states[list(RATTLE)]])
     found = np.empty((len(some), 2))
     compiled_foresee(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), check, found)
     slower, faster = rates[some, :2].imag.T
@@ -104,9 +105,7 @@ def compiled_foresee(model: Model) -> Cached:
     record, n = model.constants, len(model.constants._fields)
     load = compile_inline("load", "row", [f"return Of{tuple_of(f'row[{i}]' for i in range(n))}"], {"Of": record})
     (exchange, begin), follow = make_exchange(model), make_follow()
-    tests = np.array(
-        [(1.0, 1.0, 1.0), (_LESS, 1.0, _LONGER), (_MORE, 1.0, _SHORTER), (1.0, _LESS, 1.0), (1.0, _MORE, 1.0)]
-    )
+    tests = np.array([(1, 1, 1), (_LESS, 1, _LONGER), (_MORE, 1, _SHORTER), (1, _LESS, 1), (1, _MORE, 1)])
 
     def run(rows, E, inverse, check, found):
         size = len(rows)
