@@ -9,6 +9,7 @@ import numpy as np
 
 from sweep.grid import Array, Grid
 from sweep.jit import on_all_threads, threads
+from sweep.kernels.build import build_foreseen
 from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.reversals import Reversals
@@ -78,6 +79,7 @@ def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Arr
 
 def foreseen(model: Model, columns: Columns, *, check: bool = True) -> dict[str, Array]:
     """Return the counts by the slow equations, computed on all threads; `check` as for `foresee`."""
+    build_foreseen(model)
     size = len(next(iter(columns.values())))
     rounds = max(1, -(-size // (_SOME * threads())))
     together = max(1, -(-size // (rounds * threads())))

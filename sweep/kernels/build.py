@@ -3,8 +3,8 @@
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
 A PIECE is `kernel`, or another part that runs need: `images` and `endings`, `samples` for a misfit, `path` for single
-trajectories, and `approach` once a trajectory has failed.  For a user's model, MODEL is "name@digest", and the
-record of its origin comes as a line of standard input.
+trajectories, `approach` once a trajectory has failed, and `foreseen` for counts by the slow equations.  For a user's
+model, MODEL is "name@digest", and the record of its origin comes as a line of standard input.
 
 Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
 functions that a kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of
@@ -35,6 +35,7 @@ from sweep.kernels.samples import compiled_samples
 from sweep.models import find
 from sweep.models.model import ENDING, Model
 from sweep.models.origin import Origin
+from sweep.models.slow.foresee import compiled_foresee
 from sweep.models.stiff.final_spin import compiled_following
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
@@ -43,6 +44,7 @@ Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and the origin of the model."""
 
 KERNEL, IMAGES, ENDINGS, SAMPLES, PATH, APPROACH = "kernel", "images", "endings", "samples", "path", "approach"
+_FORESEEN = "foreseen"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
@@ -51,6 +53,7 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     SAMPLES: lambda kernel: (compiled_samples(kernel.model, "spin"),),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),
+    _FORESEEN: lambda kernel: (compiled_foresee(kernel.model),),
 }
 """The compiled functions of each piece."""
 
@@ -81,6 +84,13 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
     if jobs := missing(kernels, *also):
         with compiling():
             _compile(jobs)
+
+
+def build_foreseen(model: Model) -> None:
+    """Compile what foresees the counts of `model`, as `build` compiles its kernels, if the cache lacks it."""
+    if compiled_foresee(model).is_missing():
+        with compiling():
+            _compile([((_FORESEEN, PLAIN, model.key), model.origin)])
 
 
 def missing(kernels: Sequence[Kernel], *also: str) -> list[Job]:

@@ -144,6 +144,20 @@ def test_processes_end_with_the_one_that_started_them(
     assert told[1:] == ["interrupted: no cells finished and kept; the same command resumes the run"][: len(told) - 1]
 
 
+@pytest.mark.campaign
+def test_counts_are_foreseen_alike_by_the_process_that_compiles(tmp_path: Path) -> None:
+    """High counts, some of which depend on the last bits."""
+    program = """
+import numpy as np, sweep
+random = np.random.default_rng(5)
+drawn = {"b": random.uniform(1.5, 9.5, 300), "mu": random.uniform(500, 4000, 300), "n0": random.uniform(0.05, 0.2, 300)}
+cases = {name: values.tolist() for name, values in drawn.items()}
+print(sweep.predict({"cases": cases}, measure=["foreseen"])["reversals_foreseen"].values.tolist())
+"""
+    first, second = (python("-c", program, NUMBA_CACHE_DIR=str(tmp_path)).stdout for _ in range(2))
+    assert first == second
+
+
 @pytest.mark.parametrize("folder", ["none at all", pytest.param("a file in its place", marks=pytest.mark.campaign)])
 def test_without_a_cache_a_run_compiles_for_itself(folder: str, write: Write, tmp_path: Path) -> None:
     """The averaged model: its kernel compiles fastest."""
