@@ -15,25 +15,25 @@ _ROOT_OF_HALF = np.float64(np.sqrt(0.5)).view(np.int64)
 
 @inline
 def square(z):
-    """|z|², without the root that abs takes."""
+    """Return |z|², without the root that abs takes."""
     return z.real * z.real + z.imag * z.imag
 
 
 @inline
 def times(x, z):
-    """A real number times a complex one, for which Numba would make the first one complex."""
+    """Multiply a complex number by a real one, which Numba would first make complex."""
     return complex(x * z.real, x * z.imag)
 
 
 @inline
 def quotient(a, b):
-    """a/b of complex numbers, without the checks of a division."""
+    """Divide complex numbers, without the checks of a division."""
     return times(1.0 / square(b), a * np.conj(b))
 
 
 @inline
 def exp(x):
-    """The exponential of x, to 1e-12; beyond ±700 that of ±700.
+    """Return the exponential of x, to 1e-12; beyond ±700 that of ±700.
 
     It is found from expm1(x / 2¹⁶), by expm1(2 x) = expm1(x) (2 + expm1(x)).
     """
@@ -46,7 +46,7 @@ def exp(x):
 
 @inline
 def log1p(x):
-    """The logarithm of 1 + x, to 1 % for x up to 1e300: its exponent, and a fraction from 0.7 to 1.4."""
+    """Return the logarithm of 1 + x, to 1 % for x up to 1e300, from its exponent and a fraction from 0.7 to 1.4."""
     bits = np.float64(1.0 + x).view(np.int64)
     power = (bits - _ROOT_OF_HALF) >> 52
     fraction = np.int64(bits - (power << 52)).view(np.float64)
@@ -56,7 +56,10 @@ def log1p(x):
 
 @inline
 def turn_by(phase):
-    """exp(i phase), to 1e-13 or the round-off of the phase: sin and 1 - cos of an eighth of it, doubled three times."""
+    """Return exp(i phase), to 1e-13 or the round-off of the phase.
+
+    It is found from sin and 1 - cos of an eighth of the phase, doubled three times.
+    """
     u = 0.125 * (phase - 2.0 * np.pi * np.floor(phase / (2.0 * np.pi) + 0.5))
     q = u * u
     sin = u * (1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * (1.0 - q / 110.0)))))

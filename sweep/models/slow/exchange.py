@@ -68,7 +68,7 @@ def _in_parts(columns: np.ndarray) -> np.ndarray:
 
 
 def _waves(size: float) -> np.ndarray:
-    """What the real and the imaginary parts of coefficients contribute to a state at the points, shape (30, 72).
+    """Return what real and imaginary parts of coefficients contribute to a state at the points, shape (30, 72).
 
     The coefficients are those of linear terms, of terms of third order, and of the ripple.
     """
@@ -203,7 +203,7 @@ def _follow_modes(A, Y, C):
 
 @inline
 def _rate_of(powers, C):
-    """The rate of a product of amplitudes, by the rates C_11 and C_22."""
+    """Return the rate of a product of amplitudes, by the rates C_11 and C_22."""
     first, second = C[0, 0], C[1, 1]
     return powers[0] * first + powers[1] * second + powers[2] * np.conj(first) + powers[3] * np.conj(second)
 
@@ -264,13 +264,13 @@ def make_exchange(model: Model):
 
     @called
     def slowed(n, p, reach):
-        """ω3' in upright spin, by couples alone."""
+        """Return ω3' in upright spin, by couples alone."""
         rates, _ = rhs((0.0, 0.0, 0.0, 0.0, -n * reach, 0.0, 0.0), p)
         return rates[4] / reach
 
     @called
     def jacobian(n, p, reach, E, inverse, A):
-        """A in the modes at rest, from real and imaginary parts of E that are so small that nothing else is left."""
+        """Find A in the modes at rest, from slopes of rattles along E so small that only linear terms are left."""
         x, slopes, by_mode = np.zeros((7, 12)), np.empty((7, 12)), np.empty((6, 12))
         parts, tiny = E.view(np.float64), _SIZES[_RIPPLE] ** 2
         for i in range(6):
@@ -301,14 +301,15 @@ def make_exchange(model: Model):
         _combine(slopes[6], _OF_SPIN[level], of_spin.view(np.float64))
 
     @called
-    def linear_terms(n, p, reach, E, C, Y, small, q, sums):
-        """Find C, H and the ripple at one spin; `small` gets E (1 + Y)."""
+    def linear_terms(n, p, reach, E, C, Y, small, linear, q, sums):
+        """Find C, H and the ripple at one spin; `small` gets E (1 + Y), and `linear` (1 + Y) C."""
         basis, of_spin = np.zeros((6, 2), E.dtype), np.empty(6, E.dtype)
         for i in range(2):
             basis[i, i], q[i], q[2] = 1.0, 0.0, 0.0
             for k in range(4):
                 basis[k + 2, i] = Y[k, i]
         _product(E, basis, small)
+        _product(basis, C, linear)
         evaluate(_RIPPLE, _FEW, n, p, reach, small, q, np.empty((0, 1), E.dtype), of_spin)
         for k in range(4):
             sums[k] = C[k // 2, k % 2]
@@ -336,10 +337,6 @@ def make_exchange(model: Model):
         for i in range(2):
             for k in range(6):
                 shape[k, i] = small[k, i]
-            for k in range(2):
-                linear[k, i] = C[k, i]
-            for k in range(4):  # (1 + Y) C
-                linear[k + 2, i] = Y[k, 0] * C[0, i] + Y[k, 1] * C[1, i]
         evaluate(_CUBIC, _FEW, n, p, reach, small, q, of_x, of_spin)
         _product(inverse, of_x, found)
         _without_linear(_SIZES[_CUBIC] ** -2, linear, found)
@@ -366,7 +363,7 @@ def make_exchange(model: Model):
             jacobian(NODES[k], p, reach, E, inverse, A[k])
             _follow_modes(A[k], Y[k], C[k])
         for k in range(5):
-            linear_terms(NODES[k], p, reach, E, C[k], Y[k], small, q, sums[k])
+            linear_terms(NODES[k], p, reach, E, C[k], Y[k], small, linear, q, sums[k])
             if k < _THREE:
                 _combine(_SLOPE[k], Y.reshape((5, 8)), slope.reshape(8))
                 n, found = NODES[k], sums[k]
@@ -386,9 +383,10 @@ def make_exchange(model: Model):
 
     @called
     def begin(x, n, p, reach, E, inverse):
-        """The amplitudes a of a rattle x, and the spin without the ripple."""
+        """Return the amplitudes a of a rattle x, and the spin without the ripple."""
         A, C, Y = np.empty((6, 6), E.dtype), np.empty((2, 2), E.dtype), np.empty((4, 2), E.dtype)
-        small, q, sums = np.empty((6, 2), E.dtype), np.empty(3, E.dtype), np.empty(LOWEST, E.dtype)
+        small, linear = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype)
+        q, sums = np.empty(3, E.dtype), np.empty(LOWEST, E.dtype)
         jacobian(n, p, reach, E, inverse, A)
         _follow_modes(A, Y, C)
         z1, z2 = 0.0j, 0.0j
@@ -397,7 +395,7 @@ def make_exchange(model: Model):
         a1, a2 = z1, z2
         for _ in range(_ITERATIONS):  # a + Y* a* = z, where these rows of Y belong to the conjugates
             a1, a2 = z1 - np.conj(Y[0, 0] * a1 + Y[0, 1] * a2), z2 - np.conj(Y[1, 0] * a1 + Y[1, 1] * a2)
-        linear_terms(n, p, reach, E, C, Y, small, q, sums)
+        linear_terms(n, p, reach, E, C, Y, small, linear, q, sums)
         return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real
 
     return exchange, begin
