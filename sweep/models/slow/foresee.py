@@ -56,7 +56,7 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     states = stack(model.start({name: values[possible] for name, values in columns.items()}))
     spin, rattle, inertia = model.energy(tuple(states), p)
     reach = _REACH * np.sqrt(spin**2 + 2 * rattle / inertia)
-    rates, E = _modes_at_rest(model, p)
+    rates, E = _modes_of_bodies(model, p)
     decay = SLIP_DECAY * form_of(model).unit(p)
     sound = (rates[:, :2].imag > 0).all(axis=1) & (rates[:, 4:].real < -decay[:, None]).all(axis=1) & (reach > 0)
     some = np.flatnonzero(sound & np.isfinite(reach))
@@ -74,6 +74,15 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     apart = (3 * slower > (1 + _BELOW_THREE) * faster) & (rates[some, 4:].real < -faster[:, None]).all(axis=1)
     result.sure[possible[some]] = (found[:, 1] > 0) & apart
     return result
+
+
+def _modes_of_bodies(model: Model, p: Any) -> tuple[Array, Array]:
+    """Return rates and modes at rest of cells; those of a body are found once for its cells that follow one another."""
+    constants = stack(p)
+    new = np.append(True, (constants[:, 1:] != constants[:, :-1]).any(axis=0))
+    rates, modes = _modes_at_rest(model, take(p, np.flatnonzero(new)))
+    place = np.cumsum(new) - 1
+    return rates[place], modes[place]
 
 
 def _modes_at_rest(model: Model, p: Any) -> tuple[Array, Array]:
