@@ -10,6 +10,9 @@ import numpy as np
 from sweep.jit import inline
 
 _LOG_2 = np.log(2.0)
+_ROUNDS = 1.5 * 2.0**52
+"""Added to a number, it leaves a whole number in the lowest bits."""
+
 _ROOT_OF_HALF = np.float64(np.sqrt(0.5)).view(np.int64)
 
 
@@ -35,13 +38,15 @@ def quotient(a, b):
 def exp(x):
     """Return the exponential of x, to 1e-12; beyond ±700 that of ±700.
 
-    It is found from expm1(x / 2¹⁶), by expm1(2 x) = expm1(x) (2 + expm1(x)).
+    It is a power of two, whose exponent is written to the bits of a number, times exp(f) for |f| < 0.35.
     """
-    r = min(abs(x), 700.0) / 65536.0
-    e = r * (1.0 + r / 2.0 * (1.0 + r / 3.0 * (1.0 + r / 4.0 * (1.0 + r / 5.0 * (1.0 + r / 6.0)))))
-    for _ in range(16):
-        e = e * (2.0 + e)
-    return 1.0 + e if x >= 0.0 else 1.0 / (1.0 + e)
+    x = min(max(x, -700.0), 700.0)
+    shifted = x / _LOG_2 + _ROUNDS
+    f = x - (shifted - _ROUNDS) * _LOG_2
+    e = 1.0 + f / 9.0 * (1.0 + f / 10.0 * (1.0 + f / 11.0))
+    e = 1.0 + f / 5.0 * (1.0 + f / 6.0 * (1.0 + f / 7.0 * (1.0 + f / 8.0 * e)))
+    e = 1.0 + f * (1.0 + f / 2.0 * (1.0 + f / 3.0 * (1.0 + f / 4.0 * e)))
+    return e * np.int64((np.float64(shifted).view(np.int64) + 1023) << 52).view(np.float64)
 
 
 @inline

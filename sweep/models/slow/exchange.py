@@ -111,7 +111,7 @@ _OF_SPIN = -np.stack([
 _NEAR = 0.02
 
 # The iterations for Y converge as powers of the spin in units of a frequency: until they change it by less than this.
-_ITERATIONS, _CLOSE = 16, 1e-13
+_ITERATIONS, _CLOSE = 24, 1e-13
 
 _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 _FIT_OF_THREE = np.linalg.inv(NODES[:_THREE, None] ** np.arange(_THREE))
@@ -156,25 +156,9 @@ def _product(A, B, result):
 
 
 @called
-def _solve(M, x):
-    """Solve M x = b by elimination without pivots; b is in `x`, and both are overwritten."""
-    for k in range(len(x)):
-        by = quotient(1.0, M[k, k])
-        for i in range(k + 1, len(x)):
-            share = M[i, k] * by
-            for j in range(k + 1, len(x)):
-                M[i, j] -= share * M[k, j]
-            x[i] -= share * x[k]
-    for k in range(len(x) - 1, -1, -1):
-        for j in range(k + 1, len(x)):
-            x[k] -= M[k, j] * x[j]
-        x[k] = quotient(x[k], M[k, k])
-
-
-@called
 def _follow_modes(A, Y, C):
-    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest."""
-    M, x, left = np.empty((4, 4), A.dtype), np.empty(4, A.dtype), 1.0
+    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest, which is nearly diagonal."""
+    left = 1.0
     _clear(Y)
     for _ in range(_ITERATIONS):
         if left < _CLOSE:
@@ -184,14 +168,12 @@ def _follow_modes(A, Y, C):
         for j in range(2):
             C[0, j], C[1, j] = C[0, j] + A[0, j], C[1, j] + A[1, j]
             for i in range(4):
+                value = Y[i, 0] * C[0, j] + Y[i, 1] * C[1, j] - A[i + 2, j]
                 for k in range(4):
-                    M[i, k] = A[i + 2, k + 2]
-                M[i, i] -= C[j, j]
-                x[i] = Y[i, 1 - j] * C[1 - j, j] - A[i + 2, j]
-            _solve(M, x)
-            for i in range(4):
-                left += abs(x[i].real - Y[i, j].real) + abs(x[i].imag - Y[i, j].imag)
-                Y[i, j] = x[i]
+                    value -= A[i + 2, k + 2] * Y[k, j]
+                change = quotient(value, A[i + 2, i + 2] - C[j, j])
+                left += abs(change.real) + abs(change.imag)
+                Y[i, j] += change
 
 
 @inline

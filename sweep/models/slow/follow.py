@@ -215,26 +215,27 @@ def _turn_of(g, lane, sums, e1, e2, beat):
 
 
 @inline
-def _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
+def _longest(pace, f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
     """The length of a step; h1 and h2 are the sizes of H in the modes."""
     r1, r2 = rate1.real, rate2.real
-    way = _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(h1, h2, _TINY))
+    way = pace * _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(h1, h2, _TINY))
     step = min(_until(way, h1 * f1, r1), _until(way, h2 * f2, r2))
     step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
-    step = min(step, _CHANGE / (max(h1, h2) * min(way, left) + _TINY), _SLOWED / (d + _TINY))
+    step = min(step, pace * _CHANGE / (max(h1, h2) * min(way, left) + _TINY), pace * _SLOWED / (d + _TINY))
     acts = 2.0 * strong * np.sqrt(f1 * f2)
-    return min(step, _BEAT / (apart + acts)) if acts > _ACTS * apart else step
+    return min(step, pace * _BEAT / (apart + acts)) if acts > _ACTS * apart else step
 
 
 def make_follow():
-    """Compiled (tables, starts, cells, size, slow, pace, counts, over) -> None: follows the slow equations of `cells`.
+    """Compiled (tables, starts, cells, factors, counts, over) -> None: follows the slow equations of `cells`.
 
     Parameters
     ----------
     tables : the coefficients of `sweep.models.slow.exchange`, of all cells
     starts : of all cells, shape (cells, 8): real and imaginary parts of a_1 and a_2, n, d, and the two κ
     cells : which of them to follow
-    size, slow, pace : factors of T and Q, of d, and of the steps: 1 but for tests of how much depends on them
+    factors : of T and Q, of d, of the changes in a step, and of the start spin: 1 but for tests of how much depends on
+        them
     counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
 
     Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (λ_1 + λ_2*) at rest, of which the part
@@ -277,7 +278,7 @@ def make_follow():
             over = (r1 < 0.0) & (r2 < 0.0) & (others + beating < _OVER * lasting)
             g[_STATE + lane] = _OVER_NOW if running & over else state
             left = 0.5 * h1 * f1 / abs(r1) + 0.5 * h2 * f2 / abs(r2) + beating
-            step = pace * _longest(f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, g[_STRONG + lane])
+            step = _longest(pace, f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, g[_STRONG + lane])
             g[_STEP + lane], g[_KEEP + lane] = step, 0.0 if apart * step > _APART_STEP else 1.0
             grown = _grown(0.5 * step, rate1, rate2)
             e1, e2, beat = _means(z1, z2, 0.5 * step, rate1, rate2, grown, V)
@@ -306,8 +307,9 @@ def make_follow():
             _put_modes(g, lane, times(grown[0], z1), times(grown[1], z2) * np.conj(grown[2]), V)
 
     @called
-    def fill(g, t, lane, table, start, size, slow):
+    def fill(g, t, lane, table, start, factors):
         """Set a lane to the beginning of a trajectory."""
+        size, spin, couple = factors[0], factors[3] * start[4], factors[1] * start[5]
         parts, strong = table.view(np.float64), 0.0
         for j in range(5):
             for k in range(2 * TERMS):
@@ -319,7 +321,7 @@ def make_follow():
         _put(g, _Z1, lane, complex(start[0], start[1]))
         _put(g, _Z2, lane, complex(start[2], start[3]))
         g[_V11 + lane] = g[_V22 + lane] = g[_KEEP + lane] = 1.0
-        g[_N + lane], g[_X + lane], g[_D + lane] = start[4], start[4], slow * start[5]
+        g[_N + lane], g[_X + lane], g[_D + lane] = spin, spin, couple
         g[_BENT_RATES + lane], g[_BENT_TURN + lane] = start[6], start[7]
         g[_SIZE + lane], g[_STRONG + lane] = size, size * np.sqrt(strong)
         g[_FAR_APART + lane] = 1.0 if table[0, 3].imag > 2.0 * table[0, 0].imag else 0.0
@@ -327,7 +329,7 @@ def make_follow():
         g[_REST + _LANES + lane] = -2.0 * table[0, 6].real * both.imag / square(both)
 
     @called
-    def follow(tables, starts, cells, size, slow, pace, counts, over):
+    def follow(tables, starts, cells, factors, counts, over):
         g, t, s = np.zeros(_GROUP), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
         whose, following, begun = np.full(_LANES, -1), 0, 0
         g[_STATE : _STATE + _LANES] = _FAILED
@@ -339,13 +341,13 @@ def make_follow():
                         whose[lane], following = -1, following - 1
                     if begun < len(cells):
                         cell = cells[begun]
-                        fill(g, t, lane, tables[cell], starts[cell], size, slow)
+                        fill(g, t, lane, tables[cell], starts[cell], factors)
                         whose[lane], begun, following = cell, begun + 1, following + 1
             if not following:
                 break
             for _ in range(_BLOCK):
                 coefficients(t, g, s)
-                begin(g, s, pace)
+                begin(g, s, factors[2])
                 coefficients(t, g, s)
                 end(g, s)
 
