@@ -31,7 +31,9 @@ MIXED = (*ENDS.values(), CHAOTIC, MISSES, THIN, {}, {"n0": 0.02}, ENDS[TOPPLED] 
 """Cells that fail truly, fail falsely, are chaotic, miss their tolerance, or need no repeat."""
 
 
-@pytest.mark.parametrize("method", ["adams", "dopri5", "auto"])
+@pytest.mark.parametrize(
+    "method", ["auto", *(pytest.param(each, marks=pytest.mark.campaign) for each in ("adams", "dopri5"))]
+)
 def test_true_failures_have_their_time_and_spin(method: str) -> None:
     times, spins, *_ = zip(*(newton.end(**end, t_end=50.0) for end in ENDS.values()), strict=True)
     found = run_cells(ENDS.values(), method=method, t_end=50.0)

@@ -295,7 +295,7 @@ def test_resumes_and_recomputes_nothing(
     ran = counted(monkeypatch)
     monkeypatch.setattr(local, "BATCH", 20)
     monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: 20)  # noqa: ARG005
-    result, interruptions, last = in_sittings(3, file, tmp_path / "out")
+    result, interruptions, last = in_sittings(12, file, tmp_path / "out")
     assert interruptions > 3
     assert len(ran) > 5
     assert set(ran.values()) == {1}

@@ -34,6 +34,7 @@ def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
     assert not ADAMS.table(table)["noise_limited"].any()
 
 
+@pytest.mark.campaign
 def test_so_they_do_for_a_real_body() -> None:
     """The same body in SI, by its moments of inertia."""
     length, gravity, mass = 0.02, 9.81, 0.3
