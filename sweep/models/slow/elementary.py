@@ -38,7 +38,7 @@ def quotient(a, b):
 def exp(x):
     """Return the exponential of x, to 1e-12; beyond ±700 that of ±700.
 
-    It is a power of two, whose exponent is written to the bits of a number, times exp(f) for |f| < 0.35.
+    It is 2^k exp(f) with |f| < 0.35, where k is written into the bits of the exponent.
     """
     x = min(max(x, -700.0), 700.0)
     shifted = x / _LOG_2 + _ROUNDS

@@ -11,12 +11,12 @@ where Y has no part along the rocking modes, w is cubic in a and its conjugate, 
 
 up to terms of order |a|⁵ and |a|⁶.  With the Jacobian A of the full model at the spin n, A (1 + Y) = (1 + Y) C, so that
 C has the exact rates.  The ripple and w follow from the condition that (1) obeys the full equations with (2): their
-harmonics that do not turn with a mode, divided by their rates, which is exact at rest.  That the spin mixes the modes
-while they turn is left out of these two: with it, as many counts of random bodies are right, and 2 % more of `mu_b` at
+terms that do not turn with a mode, divided by their rates, which is exact at rest.  That the spin mixes the modes while
+they turn is left out of these two: with it, as many counts of random bodies are right, and 1 % more of `mu_b` at
 n0 = 0.1.  Unlike modes at n, all these are smooth functions of n where the two frequencies meet.  C and H are computed
 at five spins, T and Q at three, with polynomials between them.
 
-The sums in T and Q are found by evaluating the full equations on a torus of phases, at amplitudes that a trajectory
+T and Q are fitted to the full equations at 48 phases and shares of the two modes, at an amplitude that a trajectory
 reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
 T and Q are divided by 1 + κ |a|², with one κ for each.
 
@@ -33,11 +33,9 @@ from sweep.models.model import Model
 from sweep.models.slow.elementary import quotient, square
 from sweep.models.theory.linear import NODES
 
-# Products of a_1, a_2, a_1*, a_2*, by their exponents; each stands for its conjugate too.
-LINEAR = np.array([(1, 0, 0, 0), (0, 1, 0, 0)])
-MEAN = np.array([(1, 0, 1, 0), (0, 1, 0, 1), (1, 0, 0, 1)])
-"""The terms of H."""
-
+# Products of a_1, a_2, a_1*, a_2*, by their exponents; each stands for its conjugate too.  `_MEAN` are the terms of H.
+_LINEAR = np.array([(1, 0, 0, 0), (0, 1, 0, 0)])
+_MEAN = np.array([(1, 0, 1, 0), (0, 1, 0, 1), (1, 0, 0, 1)])
 SECOND = np.array([(2, 0, 0, 0), (1, 1, 0, 0), (0, 2, 0, 0)])
 """The ripple."""
 
@@ -46,7 +44,7 @@ THIRD = np.array([(2, 0, 1, 0), (2, 0, 0, 1), (1, 1, 1, 0), (1, 1, 0, 1), (0, 2,
 RESONANT = 6
 """The first ones of `THIRD` turn as a_1 or a_2 do where the frequencies meet: they are the terms of T."""
 
-FOURTH = np.array([(2, 0, 2, 0), (1, 1, 1, 1), (0, 2, 0, 2), (2, 0, 1, 1), (1, 1, 0, 2), (2, 0, 0, 2),
+_FOURTH = np.array([(2, 0, 2, 0), (1, 1, 1, 1), (0, 2, 0, 2), (2, 0, 1, 1), (1, 1, 0, 2), (2, 0, 0, 2),
                    *(each for each in np.ndindex(5, 5, 5, 5) if sum(each) == 4 and each[0] + each[1] > 2)])  # fmt: skip
 """The terms of Q, and all others of that order."""
 
@@ -63,15 +61,16 @@ _RIPPLE, _CUBIC, _USUAL, _LARGE = range(4)
 
 # Points where the equations are evaluated, by phases of both modes in eighths of a turn and by their shares of the
 # energy: the first mode alone, the second alone, both alike, and both unlike, which only Q needs.  The second mode
-# takes half a turn, because the equations are odd.  Fewer points, which come first, suffice for terms that are small.
-# With half as many alike, 70 % of counts of `mu_b` at n0 = 0.1 are right, in place of 78; with four times as many
-# unlike, no more.
+# takes half a turn, because the equations are odd.  Those alike are sorted: eight of a coarse grid come first, with
+# which the 16 points for the ripple end, and then eight that make a checkerboard of it, for w.  With the checkerboard
+# for T and Q too, 70 % of counts of `mu_b` at n0 = 0.1 are right, in place of 78.
 _LINE, _COARSE = [(k, k) for k in range(4)], [(j, k) for j in range(0, 8, 2) for k in (0, 2)]
 _TORUS = sorted(np.ndindex(8, 4), key=lambda phases: (phases not in _COARSE, sum(phases) % 2))
 _PHASES = np.array([*_LINE, *_LINE, *_TORUS, *_COARSE])
 _SHARES = np.repeat([(1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.8, 0.2)], [4, 4, 32, 8], axis=0)
-_POINTS, _OF_MOTION, _OF_TURN = (16, 24, 48, 48), (0, 24, 40, 40), (16, 0, 48, 48)
-"""How many of them are evaluated at each amplitude, and how many serve the terms of x' and of ω3'."""
+_POINTS_OF_X, _POINTS_OF_SPIN = (0, 24, 40, 40), (16, 0, 48, 48)
+"""How many of them serve the terms of x' and of ω3' at each amplitude: multiples of eight, for vector instructions."""
+_POINTS = tuple(map(max, _POINTS_OF_X, _POINTS_OF_SPIN))
 
 
 def _in_parts(columns: np.ndarray) -> np.ndarray:
@@ -86,32 +85,33 @@ def _waves(products: np.ndarray, size: float) -> np.ndarray:
     return _in_parts(2 * np.prod(amplitudes, axis=2) * turns.conj()).T.copy()
 
 
-def _weights(products: np.ndarray, size: float, points: int, some: int) -> np.ndarray:
-    """Return weights of numbers at the first points: by the sums, products fit them best, shape (48, 2 some).
+def _weights(products: np.ndarray, size: float, points: int, wanted: int) -> np.ndarray:
+    """Return the weights by which numbers at the first points give coefficients of the first products that fit them.
 
-    The products are all of one order, of which the sums of some are wanted.  They fit products of lower order too,
-    because |a|² is the same at all points.
+    The products are all of one order.  They fit those of lower order too, because |a|² is the same at all points.
     """
+    # a_1⁴ and a_2⁴ are real at all points: their imaginary parts have no weight.
     fit = np.linalg.pinv(_waves(products, size)[:, :points], rcond=1e-9)
-    real = (products[:, :2] == products[:, 2:]).all(axis=1)  # is its own conjugate
-    weights = np.zeros((len(_PHASES), 2 * some))
-    weights[:points] = (fit * np.repeat(1 + real, 2))[:, : 2 * some]
+    real = (products[:, :2] == products[:, 2:]).all(axis=1)  # its own conjugate, which counts once
+    weights = np.zeros((len(_PHASES), 2 * wanted))
+    weights[:points] = (fit * np.repeat(1 + real, 2))[:, : 2 * wanted]
     return weights
 
 
-_WAVES = np.stack([_waves(np.concatenate([LINEAR, THIRD]), size) for size in _SIZES])
+_WAVES = np.stack([_waves(np.concatenate([_LINEAR, THIRD]), size) for size in _SIZES])
 _RIPPLES = np.stack([_waves(SECOND, size) for size in _SIZES])
-_OF_X = np.stack([_weights(THIRD, size, points, 10) for size, points in zip(_SIZES, _OF_MOTION, strict=True)])
+_OF_X = np.stack([_weights(THIRD, size, points, 10) for size, points in zip(_SIZES, _POINTS_OF_X, strict=True)])
 _OF_SPIN = -np.stack([
-    _weights(FOURTH if level else np.concatenate([MEAN, SECOND]), _SIZES[level], _OF_TURN[level], 6)
+    _weights(_FOURTH if level else np.concatenate([_MEAN, SECOND]), _SIZES[level], _POINTS_OF_SPIN[level], 6)
     for level in range(4)
 ])  # fmt: skip
 
 # The least difference of rates by which a term of w is divided, relative to a frequency.
 _NEAR = 0.02
 
-# The iterations for Y converge as powers of the spin in units of a frequency: until they change it by less than this.
-_ITERATIONS, _CLOSE = 24, 1e-13
+# The iterations for Y, and those for a, converge as powers of the spin in units of a frequency.  Those for Y end when
+# they change it by less than `_CLOSE`, and have failed if the last one changes it by more than `_FAR`.
+_ITERATIONS, _CLOSE, _FAR = 24, 1e-13, 1e-6
 
 _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 _FIT_OF_THREE = np.linalg.inv(NODES[:_THREE, None] ** np.arange(_THREE))
@@ -157,7 +157,10 @@ def _product(A, B, result):
 
 @called
 def _follow_modes(A, Y, C):
-    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest, which is nearly diagonal."""
+    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest, and return whether that has succeeded.
+
+    It does where A is nearly diagonal.
+    """
     left = 1.0
     _clear(Y)
     for _ in range(_ITERATIONS):
@@ -174,6 +177,7 @@ def _follow_modes(A, Y, C):
                 change = quotient(value, A[i + 2, i + 2] - C[j, j])
                 left += abs(change.real) + abs(change.imag)
                 Y[i, j] += change
+    return left < _FAR
 
 
 @inline
@@ -202,7 +206,7 @@ def _find_third(A, C, Y, f, w):
 
 @called
 def _without_linear(share, linear, found):
-    """Subtract from terms of third order what `_of_x` leaves in them of the linear ones."""
+    """Subtract from terms of third order what `_OF_X` leaves in them of the linear ones."""
     for k in range(len(found)):
         for m, i in ((0, 0), (3, 0), (2, 1), (5, 1)):
             found[k, m] -= share * linear[k, i]
@@ -221,10 +225,11 @@ def _bend(sums, large, bent):
 
 
 def make_exchange(model: Model):
-    """Compiled (p, reach, E, E⁻¹, table, bent) -> d, which writes the coefficients of a body, and `begin`.
+    """Compiled (p, reach, E, E⁻¹, table, bent) -> (d, followed), which writes the coefficients of a body, and `begin`.
 
     E is in units of `reach`.  `table`, of shape (5, TERMS), gets the coefficients of the polynomials in the spin, of
-    fourth degree for C and H and of second degree for T and Q; and `bent` the two κ.
+    fourth degree for C and H and of second degree for T and Q; and `bent` the two κ.  `followed` says whether the
+    modes could be followed to all spins.
     """
     rhs, couples = model.rhs, bool(model.variant and model.variant.couples)
 
@@ -246,6 +251,7 @@ def make_exchange(model: Model):
     @called
     def jacobian(n, p, reach, E, inverse, A):
         """Find A in the modes at rest, from slopes of rattles along E so small that only linear terms are left."""
+        # Twelve columns are used; sixteen are evaluated as fast, because eight at a time make a vector.
         x, slopes, by_mode = np.zeros((7, 16)), np.empty((7, 16)), np.empty((6, 12))
         parts, tiny = E.view(np.float64), _SIZES[_RIPPLE] ** 2
         for i in range(6):
@@ -271,7 +277,7 @@ def make_exchange(model: Model):
         _combine(q.view(np.float64), _RIPPLES[level], x[6])
         slopes_of(x, n, p, reach, slopes)
         for i in range(len(of_x)):
-            _combine(slopes[i], _OF_X[level], of_x[i].view(np.float64))
+            _combine(slopes[i, : _POINTS_OF_X[level]], _OF_X[level], of_x[i].view(np.float64))
         for i in range(points):
             slopes[6, i] -= drag
         _combine(slopes[6], _OF_SPIN[level], of_spin.view(np.float64))
@@ -303,17 +309,17 @@ def make_exchange(model: Model):
         for i in range(2):
             for m in range(RESONANT):
                 sums[LOWEST + i * RESONANT + m] = found[i, m]
-        for k, h in ((0, 4), (1, 4), (1, 5), (2, 5), (3, 6), (4, 6)):  # `_of_spin` leaves H in them
+        for k, h in ((0, 4), (1, 4), (1, 5), (2, 5), (3, 6), (4, 6)):  # `_OF_SPIN` leaves H in them
             of_spin[k] -= per * sums[h]
 
     @called
     def higher_terms(n, p, reach, E, inverse, A, C, Y, slope, small, q, linear, shape, sums):
         """Find T and Q at one spin; `slope` is the derivative of Y by n, and `shape` gets E (1 + Y + w)."""
-        of_x, of_spin, found = np.empty((6, 10), E.dtype), np.empty(6, E.dtype), np.empty((6, 10), E.dtype)
+        of_x, found = np.empty((6, 10), E.dtype), np.empty((6, 10), E.dtype)
         for i in range(2):
             for k in range(6):
                 shape[k, i] = small[k, i]
-        evaluate(_CUBIC, n, p, reach, small, q, of_x, of_spin)
+        evaluate(_CUBIC, n, p, reach, small, q, of_x, np.empty(0, E.dtype))
         _product(inverse, of_x, found)
         _without_linear(_SIZES[_CUBIC] ** -2, linear, found)
         for m in range(RESONANT):  # Y depends on the spin, which changes
@@ -335,9 +341,10 @@ def make_exchange(model: Model):
         A, C, Y = np.empty((5, 6, 6), E.dtype), np.empty((5, 2, 2), E.dtype), np.empty((5, 4, 2), E.dtype)
         sums, slope, q = np.empty((5, TERMS), E.dtype), np.empty((4, 2), E.dtype), np.empty(3, E.dtype)
         small, linear, shape = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
+        followed = True
         for k in range(5):
             jacobian(NODES[k], p, reach, E, inverse, A[k])
-            _follow_modes(A[k], Y[k], C[k])
+            followed &= _follow_modes(A[k], Y[k], C[k])
         for k in range(5):
             linear_terms(NODES[k], p, reach, E, C[k], Y[k], small, linear, q, sums[k])
             if k < _THREE:
@@ -355,7 +362,7 @@ def make_exchange(model: Model):
             for k in range(len(fit)):
                 for j in range(len(fit)):
                     table[k, m] += straight * fit[k, j] * sums[j, m]
-        return slowed(1.0, p, reach) if couples else 0.0
+        return slowed(1.0, p, reach) if couples else 0.0, followed
 
     @called
     def begin(x, n, p, reach, E, inverse):

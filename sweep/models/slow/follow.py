@@ -234,8 +234,8 @@ def make_follow():
     tables : the coefficients of `sweep.models.slow.exchange`, of all cells
     starts : of all cells, shape (cells, 8): real and imaginary parts of a_1 and a_2, n, d, and the two κ
     cells : which of them to follow
-    factors : of T and Q, of d, of the changes in a step, and of the start spin: 1 but for tests of how much depends on
-        them
+    factors : of T and Q, of d, of the changes in a step, and of the start spin: all 1, except to test how much a count
+        depends on them
     counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
 
     Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (λ_1 + λ_2*) at rest, of which the part
