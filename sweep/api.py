@@ -588,16 +588,15 @@ class Accessor:
 
         Raises
         ------
-        ValueError
-            if the dataset contains no configuration.
         ConfigError
-            as `sweep.trajectory`; also if the model is user-defined: its code runs only if you pass the configuration
-            to `sweep.trajectory`.
+            if the dataset contains no configuration, and as `sweep.trajectory`; also if the model is user-defined: its
+            code runs only if you pass the configuration to `sweep.trajectory`.
         """
-        if "config" not in self._dataset.attrs:
-            raise ValueError("the dataset contains no configuration; call sweep.trajectory with one")
+        from sweep.faults import fault_of
         from sweep.results.configuration import configuration
 
+        if "config" not in self._dataset.attrs:
+            raise fault_of("the dataset contains no configuration; call sweep.trajectory with one")
         return trajectory(configuration(self._dataset), **values)
 
 

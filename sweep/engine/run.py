@@ -23,6 +23,7 @@ from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_aga
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
+from sweep.faults import fault_of
 from sweep.grid import Tile
 from sweep.interrupt import deferred, point
 from sweep.models.user.blame import blamed
@@ -55,7 +56,7 @@ def run(
     """Run as `sweep.api.run`; messages go to `reporter` only."""
     config = load_config(config, overrides)
     if rerun not in (None, *RERUN):
-        raise ValueError(f"rerun must be {' or '.join(RERUN)}, not {rerun!r}")
+        raise fault_of(f"must be {' or '.join(RERUN)}, not {rerun!r}", "rerun")
     if rerun and fresh:
         raise StoreError("--rerun: it needs the dataset that --fresh discards; leave out one of the two")
     if rerun and output is None:

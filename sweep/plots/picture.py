@@ -34,7 +34,7 @@ from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
 from sweep.results.dataset import VARIABLES
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, Kind, kind, require_whole
+from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, Kind, kind, require_whole
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 from sweep.units import LENGTH, quantity
@@ -158,6 +158,8 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
     """Draw a dataset of any kind."""
     of_kind = kind(dataset)
+    if of_kind is CHANGES:
+        raise fault_of(f"{CHANGES.words} have no figure; `sweep info` and print(dataset) show them")
     if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
         options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, **how}
         if given := [name for name, value in options.items() if value]:

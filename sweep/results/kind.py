@@ -74,6 +74,10 @@ INDICES = Kind(
     needs=_over(("quantity", "parameter"), *_ENDS) | {name: (name,) for name in ("quantity", "parameter")},
     attributes=("title", "trajectories"),
 )  # fmt: skip
+CHANGES = Kind(
+    "changes", "changes of a body", frozenset({"change", "unchanged_at", "changed_at"}),
+    needs=_over(("parameter",), "parameter", "value", "change", "changed_at", "reversals"), attributes=("reversals",),
+)  # fmt: skip
 RUN = Kind("run", "a run", frozenset(), explored=True)
 """Kinds whose variables depend on what was measured. Predictions and a part of a run count as a run."""
 
@@ -92,7 +96,7 @@ _TEXTS = (
 _NUMBERS = ("wall_time", "trajectories_per_second", "fits")
 """Optional attributes that are numbers."""
 
-_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, RUN)}
+_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, CHANGES, RUN)}
 
 
 def kind(dataset: xr.Dataset) -> Kind | None:

@@ -12,7 +12,7 @@ from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import REASONS, STATUSES, Reason
-from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, INDICES, SPINS, TRAJECTORY, Kind, kind, parameters
+from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, INDICES, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
 
@@ -112,6 +112,15 @@ def _indices(dataset: xr.Dataset) -> Iterator[str]:
                 for order in ("first_order", "total_order")
             )
             yield f"  {quantity:18} {name:8} {alone:22}   {total}".rstrip()
+
+
+def _changes(dataset: xr.Dataset) -> Iterator[str]:
+    """Report the nearest value of each parameter that gives another count."""
+    yield f"{dataset.attrs['reversals']} reversals now; the nearest value of each parameter that changes the count:"
+    for name in dataset["parameter"].values:
+        one = {key: dataset[key].sel(parameter=name).item() for key in ("value", "change", "changed_at", "reversals")}
+        found = f"{one['changed_at']:<12.6g} ({one['change']:+.2%}): {one['reversals']} reversals"
+        yield f"  {name:8} {one['value']:<12.6g} {found if np.isfinite(one['change']) else 'none is found'}"
 
 
 def _laws(dataset: xr.Dataset) -> Iterator[str]:
@@ -246,4 +255,5 @@ _LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {
     BOUNDARIES: _boundaries,
     FIT: _fit,
     INDICES: _indices,
+    CHANGES: _changes,
 }

@@ -21,6 +21,7 @@ from sweep.models.general import starts
 from sweep.models.general.surfaces import SURFACES
 from sweep.models.model import ENDING
 from sweep.prediction import foreseen
+from sweep.results.kind import ATTRIBUTE, CHANGES
 from sweep.studies.study import measuring, require_certain
 
 # Each parameter is scanned from half of its value to twice as much, in steps of 0.7 %.
@@ -143,4 +144,4 @@ def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapp
     }
     variables = {name: ("parameter", values, {"long_name": meaning}) for name, (values, meaning) in columns.items()}
     attributes = {"title": f"{config.name}: changes of {now} reversals", "config": config.label(), "reversals": now}
-    return xr.Dataset(variables, {"parameter": names}, attributes)
+    return xr.Dataset(variables, {"parameter": names}, {ATTRIBUTE: CHANGES.name, **attributes})

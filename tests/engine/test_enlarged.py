@@ -248,7 +248,7 @@ def test_rerun_needs_a_dataset_that_was_not_refined(write: Write, tmp_path: Path
         grown(write, tmp_path / "out", ONE, rerun="failed", refine=1, tolerance=1e-9)
     with pytest.raises(StoreError, match="--rerun needs the dataset"):
         grown(write, tmp_path / "out", ONE, rerun="limit")
-    with pytest.raises(ValueError, match="rerun must be failed or limit, not 'all'"):
+    with pytest.raises(ValueError, match="rerun: must be failed or limit, not 'all'"):
         grown(write, tmp_path / "out", ONE, rerun="all")
     grown(write, tmp_path / "out", SINGLE)
     with pytest.raises(StoreError, match="leave out one of the two"):

@@ -1,9 +1,12 @@
 """Which change of a body gives one reversal more: foreseen, and confirmed by the full model."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support.cli import invoke
 
 import sweep
 
@@ -25,6 +28,17 @@ def test_the_full_model_counts_so_on_both_sides(reversals: int) -> None:
         again = sweep.run(BODY, method="dopri5", tolerance=1e-9, **{name: sorted(values)})
         np.testing.assert_array_equal(again.reversals.sel({name: values}), [now, now + reversals])
         assert one.reversals == now + reversals
+
+
+def test_the_dataset_of_changes_is_described_and_not_drawn(tmp_path: Path) -> None:
+    found = sweep.changes(BODY)
+    found.to_netcdf(tmp_path / "changes.nc")
+    said = invoke("info", tmp_path / "changes.nc").stdout
+    assert "3 reversals now; the nearest value of each parameter that changes the count:" in said
+    assert re.search(r"mu +60 +\S+ +\([-+][\d.]+%\): 4 reversals", said)
+    assert re.search(r"b +3 +none is found", said)
+    with pytest.raises(sweep.ConfigError, match="changes of a body have no figure"):
+        sweep.plot(found)
 
 
 def test_the_nearest_change_is_found_and_none_is_made_up() -> None:
