@@ -589,8 +589,8 @@ class Accessor:
         Raises
         ------
         ConfigError
-            if the dataset contains no configuration, and as `sweep.trajectory`; also if the model is user-defined: its
-            code runs only if you pass the configuration to `sweep.trajectory`.
+            if the dataset contains no configuration, or if the model is user-defined, because its code runs only if you
+            pass the configuration to `sweep.trajectory`; otherwise as for `sweep.trajectory`.
         """
         from sweep.faults import fault_of
         from sweep.results.configuration import configuration

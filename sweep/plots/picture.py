@@ -159,7 +159,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
     """Draw a dataset of any kind."""
     of_kind = kind(dataset)
     if of_kind is CHANGES:
-        raise fault_of(f"{CHANGES.words} have no figure; `sweep info` and print(dataset) show them")
+        raise fault_of(f"{CHANGES.words} have no figure; use `sweep info` or print the dataset")
     if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
         options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, **how}
         if given := [name for name, value in options.items() if value]:

@@ -29,7 +29,7 @@ class Kind:
     """A kind of dataset."""
 
     name: str
-    """The command that creates it."""
+    """The command or function that creates it."""
     words: str
     """What it contains."""
     marks: frozenset[str]

@@ -115,12 +115,12 @@ def _indices(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _changes(dataset: xr.Dataset) -> Iterator[str]:
-    """Report the nearest value of each parameter that gives another count."""
-    yield f"{dataset.attrs['reversals']} reversals now; the nearest value of each parameter that changes the count:"
+    """Report the nearest value of each parameter that gives the requested count."""
+    yield f"{dataset.attrs['reversals']} reversals now; the requested count begins at these values of each parameter:"
     for name in dataset["parameter"].values:
-        one = {key: dataset[key].sel(parameter=name).item() for key in ("value", "change", "changed_at", "reversals")}
-        found = f"{one['changed_at']:<12.6g} ({one['change']:+.2%}): {one['reversals']} reversals"
-        yield f"  {name:8} {one['value']:<12.6g} {found if np.isfinite(one['change']) else 'none is found'}"
+        one = dataset.sel(parameter=name)
+        found = f"{one['changed_at'].item():<12.6g} ({one['change'].item():+.2%}): {one['reversals'].item()} reversals"
+        yield f"  {name:8} {one['value'].item():<12.6g} {found if one['change'].notnull() else 'none found'}"
 
 
 def _laws(dataset: xr.Dataset) -> Iterator[str]:

@@ -34,9 +34,9 @@ def test_the_dataset_of_changes_is_described_and_not_drawn(tmp_path: Path) -> No
     found = sweep.changes(BODY)
     found.to_netcdf(tmp_path / "changes.nc")
     said = invoke("info", tmp_path / "changes.nc").stdout
-    assert "3 reversals now; the nearest value of each parameter that changes the count:" in said
+    assert "3 reversals now; the requested count begins at these values of each parameter:" in said
     assert re.search(r"mu +60 +\S+ +\([-+][\d.]+%\): 4 reversals", said)
-    assert re.search(r"b +3 +none is found", said)
+    assert re.search(r"b +3 +none found", said)
     with pytest.raises(sweep.ConfigError, match="changes of a body have no figure"):
         sweep.plot(found)
 

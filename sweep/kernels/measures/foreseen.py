@@ -20,7 +20,7 @@ class Foreseen(Measurement):
         ),
         "foreseen_sure": Variable(
             "int8", NUMBER, "is the foreseen count sure?",
-            "Whether the foreseen count stays the same if higher orders change by a third and the start by 3 %.",
+            "Whether the foreseen count stays if terms of higher order change by a third and the start spin by 3 %.",
             {0: "unsure", 1: "sure"},
         ),
     }  # fmt: skip

@@ -11,7 +11,7 @@ from sweep.jit import inline
 
 _LOG_2 = np.log(2.0)
 _ROUNDS = 1.5 * 2.0**52
-"""Added to a number, it leaves a whole number in the lowest bits."""
+"""Added to a number, it leaves the nearest whole number in the lowest bits."""
 
 _ROOT_OF_HALF = np.float64(np.sqrt(0.5)).view(np.int64)
 

@@ -16,9 +16,9 @@ they turn is left out of these two: with it, as many counts of random bodies are
 n0 = 0.1.  Unlike modes at n, all these are smooth functions of n where the two frequencies meet.  C and H are computed
 at five spins, T and Q at three, with polynomials between them.
 
-T and Q are fitted to the full equations at 48 phases and shares of the two modes, at an amplitude that a trajectory
-reaches, so that they hold the mean effect of higher orders there.  How they change with the energy is measured at rest:
-T and Q are divided by 1 + κ |a|², with one κ for each.
+T and Q are fitted to the full equations at 48 points, which differ in the phases and shares of the two modes, at an
+amplitude that a trajectory reaches, so that they hold the mean effect of higher orders there.  How they change with the
+energy is measured at rest: T and Q are divided by 1 + κ |a|², with one κ for each.
 
 A couple adds -d n to n', where d does not depend on the spin.  C and the ripple then follow the spin as if it stood
 still, which leaves out terms of the order of d in units of a frequency.
@@ -61,15 +61,15 @@ _RIPPLE, _CUBIC, _USUAL, _LARGE = range(4)
 
 # Points where the equations are evaluated, by phases of both modes in eighths of a turn and by their shares of the
 # energy: the first mode alone, the second alone, both alike, and both unlike, which only Q needs.  The second mode
-# takes half a turn, because the equations are odd.  Those alike are sorted: eight of a coarse grid come first, with
-# which the 16 points for the ripple end, and then eight that make a checkerboard of it, for w.  With the checkerboard
-# for T and Q too, 70 % of counts of `mu_b` at n0 = 0.1 are right, in place of 78.
+# takes half a turn, because the equations are odd.  The points where both are alike are sorted: the first 16 points end
+# with a coarse grid, which suffices for the ripple, and the first 24 with a checkerboard, which suffices for w.  For T
+# and Q it does not: 70 % of counts of `mu_b` at n0 = 0.1 would be right, in place of 78.
 _LINE, _COARSE = [(k, k) for k in range(4)], [(j, k) for j in range(0, 8, 2) for k in (0, 2)]
 _TORUS = sorted(np.ndindex(8, 4), key=lambda phases: (phases not in _COARSE, sum(phases) % 2))
 _PHASES = np.array([*_LINE, *_LINE, *_TORUS, *_COARSE])
 _SHARES = np.repeat([(1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.8, 0.2)], [4, 4, 32, 8], axis=0)
 _POINTS_OF_X, _POINTS_OF_SPIN = (0, 24, 40, 40), (16, 0, 48, 48)
-"""How many of them serve the terms of x' and of ω3' at each amplitude: multiples of eight, for vector instructions."""
+"""The numbers of points for x' and for ω3' at each amplitude: multiples of eight, which vector instructions need."""
 _POINTS = tuple(map(max, _POINTS_OF_X, _POINTS_OF_SPIN))
 
 
@@ -86,9 +86,10 @@ def _waves(products: np.ndarray, size: float) -> np.ndarray:
 
 
 def _weights(products: np.ndarray, size: float, points: int, wanted: int) -> np.ndarray:
-    """Return the weights by which numbers at the first points give coefficients of the first products that fit them.
+    """Return the weights that turn numbers at the first points into the coefficients of products that fit them best.
 
-    The products are all of one order.  They fit those of lower order too, because |a|² is the same at all points.
+    `products` are all of one order; weights are returned for the first `wanted`.  They fit products of lower order too,
+    because |a|² is the same at all points.
     """
     # a_1⁴ and a_2⁴ are real at all points: their imaginary parts have no weight.
     fit = np.linalg.pinv(_waves(products, size)[:, :points], rcond=1e-9)
@@ -110,7 +111,7 @@ _OF_SPIN = -np.stack([
 _NEAR = 0.02
 
 # The iterations for Y, and those for a, converge as powers of the spin in units of a frequency.  Those for Y end when
-# they change it by less than `_CLOSE`, and have failed if the last one changes it by more than `_FAR`.
+# they change Y by less than `_CLOSE`, and have failed if the last one changes it by more than `_FAR`.
 _ITERATIONS, _CLOSE, _FAR = 24, 1e-13, 1e-6
 
 _FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
@@ -157,9 +158,9 @@ def _product(A, B, result):
 
 @called
 def _follow_modes(A, Y, C):
-    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest, and return whether that has succeeded.
+    """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest; return whether the iteration converged.
 
-    It does where A is nearly diagonal.
+    It converges where A is nearly diagonal.
     """
     left = 1.0
     _clear(Y)

@@ -216,7 +216,7 @@ def _turn_of(g, lane, sums, e1, e2, beat):
 
 @inline
 def _longest(pace, f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
-    """The length of a step; h1 and h2 are the sizes of H in the modes."""
+    """The length of a step, with `pace` times the usual changes; h1 and h2 are the sizes of H in the modes."""
     r1, r2 = rate1.real, rate2.real
     way = pace * _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(h1, h2, _TINY))
     step = min(_until(way, h1 * f1, r1), _until(way, h2 * f2, r2))

@@ -21,7 +21,7 @@ _REACH = 1.02
 # Factors of terms of higher order, of a couple, of the changes in a step, and of the start spin.  The first row gives
 # the count.  It is sure if the next two leave it as it is, and with a couple the last two as well: for 1/d the spin
 # lingers above the critical one, and a tiny mode grows or does not.  Of 5901 cells of `mu_b` 55 % are sure, two of them
-# falsely; with the same start spin 63 % were, 29 of them falsely.  Twice the changes in a step take half the time.
+# falsely; with the same start spin 63 % were, 20 of them falsely.  Twice the changes in a step take half the time.
 _FACTORS = np.array([
     (1, 1, 1, 1),
     (0.7, 1, 2, 1.03),
@@ -30,6 +30,7 @@ _FACTORS = np.array([
     (1, 1.4, 2, 1),
 ])  # fmt: skip
 _WITHOUT_COUPLE = 3
+"""The number of rows that are used without a couple."""
 
 # A faster mode that turns three times as fast as the slower one, or 5, 7 or 9 times, is driven by its harmonics, which
 # the equations leave out: of 44 random cells that were sure although the ratio exceeds 3.9, six were false. The ratio
@@ -84,7 +85,7 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
 
 
 def _modes_of_bodies(model: Model, p: Any) -> tuple[Array, Array]:
-    """Return rates and modes at rest of cells; those of a body are found once for its cells that follow one another."""
+    """Return rates and modes at rest of cells, which are found once for consecutive cells of a body."""
     constants = stack(p)
     new = np.append(True, (constants[:, 1:] != constants[:, :-1]).any(axis=0))
     rates, modes = _modes_at_rest(model, take(p, np.flatnonzero(new)))
