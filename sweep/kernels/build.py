@@ -3,7 +3,7 @@
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
 A PIECE is `kernel`, or another part that runs need: `images` and `endings`, `samples` for a misfit, `path` for single
-trajectories, `approach` once a trajectory has failed, and `foreseen` for counts by the slow equations.  For a user's
+trajectories, `approach` once a trajectory has failed, and `exchange` and `follow` for foreseen counts.  For a user's
 model, MODEL is "name@digest", and the record of its origin comes as a line of standard input.
 
 Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
@@ -28,6 +28,7 @@ from sweep.interrupt import point
 from sweep.jit import Cached, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
+from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
@@ -35,7 +36,7 @@ from sweep.kernels.samples import compiled_samples
 from sweep.models import find
 from sweep.models.model import ENDING, Model
 from sweep.models.origin import Origin
-from sweep.models.slow.foresee import compiled_foresee
+from sweep.models.slow.foresee import compiled_exchange, compiled_follow
 from sweep.models.stiff.final_spin import compiled_following
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
@@ -44,7 +45,7 @@ Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and the origin of the model."""
 
 KERNEL, IMAGES, ENDINGS, SAMPLES, PATH, APPROACH = "kernel", "images", "endings", "samples", "path", "approach"
-_FORESEEN = "foreseen"
+_EXCHANGE, _FOLLOW = "exchange", "follow"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
@@ -53,11 +54,12 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     SAMPLES: lambda kernel: (compiled_samples(kernel.model, "spin"),),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),
-    _FORESEEN: lambda kernel: (compiled_foresee(kernel.model),),
+    _EXCHANGE: lambda kernel: (compiled_exchange(kernel.model),),
+    _FOLLOW: lambda kernel: (compiled_follow(),),
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, SAMPLES: 3.0, PATH: 4.0, APPROACH: 4.0}
+_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, SAMPLES: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _POLL = 0.05
@@ -88,9 +90,9 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
 
 def build_foreseen(model: Model) -> None:
     """Compile what foresees the counts of `model`, as `build` compiles its kernels, if the cache lacks it."""
-    if compiled_foresee(model).is_missing():
+    if jobs := [(piece, model.origin) for piece in _lacking(make_kernel(PLAIN, model, ()), (_EXCHANGE, _FOLLOW))]:
         with compiling():
-            _compile([((_FORESEEN, PLAIN, model.key), model.origin)])
+            _compile(jobs)
 
 
 def missing(kernels: Sequence[Kernel], *also: str) -> list[Job]:
@@ -116,8 +118,14 @@ def try_compiling(model: Model) -> None:
 
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
+    foreseen = [_EXCHANGE, _FOLLOW] if Foreseen.name in kernel.measure else []
     samples = [SAMPLES] if Misfit.name in kernel.measure else []
-    for piece in (KERNEL, IMAGES, ENDINGS, *samples, *also):
+    return _lacking(kernel, (*foreseen, KERNEL, IMAGES, ENDINGS, *samples, *also))
+
+
+def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]:
+    """List those of `pieces` that the cache lacks, as arguments of this module."""
+    for piece in pieces:
         if any(function.is_missing() for function in _PIECES[piece](kernel)):
             method = kernel.method if piece in (KERNEL, IMAGES) else PLAIN
             measure = (each.spec for each in kernel.measurements if each.in_kernel and piece == KERNEL)

@@ -54,6 +54,16 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     ]
 
 
+def test_foreseen_counts_have_pieces_of_their_own(started: list[tuple[str, ...]]) -> None:
+    """What follows the slow equations is the same for all models; a prediction needs no kernel."""
+    foreseen = [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
+    build([kernel(measure=("reversals", "foreseen"))])
+    assert started[:3] == [*foreseen, ("kernel", "dopri5", "slip", "reversals", "decay")]
+    started.clear()
+    sweep.predict({"friction": {"mu": 60}}, measure=["foreseen"])
+    assert started == foreseen
+
+
 def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
     piece = ("approach", "dopri5", "slip")
     run_cells([{}], t_end=10.0)

@@ -367,12 +367,12 @@ def make_exchange(model: Model):
 
     @called
     def begin(x, n, p, reach, E, inverse):
-        """Return the amplitudes a of a rattle x, and the spin without the ripple."""
+        """Return the amplitudes a of a rattle x, the spin without the ripple, and `followed` at a spin n."""
         A, C, Y = np.empty((6, 6), E.dtype), np.empty((2, 2), E.dtype), np.empty((4, 2), E.dtype)
         small, linear = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype)
         q, sums = np.empty(3, E.dtype), np.empty(LOWEST, E.dtype)
         jacobian(n, p, reach, E, inverse, A)
-        _follow_modes(A, Y, C)
+        followed = _follow_modes(A, Y, C)
         z1, z2 = 0.0j, 0.0j
         for k in range(6):
             z1, z2 = z1 + inverse[0, k] * x[k], z2 + inverse[1, k] * x[k]
@@ -380,6 +380,6 @@ def make_exchange(model: Model):
         for _ in range(_ITERATIONS):  # a + Y* a* = z, where these rows of Y belong to the conjugates
             a1, a2 = z1 - np.conj(Y[0, 0] * a1 + Y[0, 1] * a2), z2 - np.conj(Y[1, 0] * a1 + Y[1, 1] * a2)
         linear_terms(n, p, reach, E, C, Y, small, linear, q, sums)
-        return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real
+        return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real, followed
 
     return exchange, begin

@@ -14,6 +14,7 @@ from sweep.models.slow.exchange import TERMS, make_exchange
 from sweep.models.slow.follow import make_follow
 from sweep.models.stiff.modes import RATTLE, SLIP_DECAY
 from sweep.models.stiff.slip import form_of
+from sweep.models.theory.linear import jacobian
 
 # The fastest spin within reach, in units of the spin that has all the energy.
 _REACH = 1.02
@@ -74,14 +75,28 @@ def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
     p, states, reach = take(p, some), states[:, some], reach[some]
     E = reach[:, None, None] * _of_unit_energy(model, p, E[some])
     rows = np.concatenate([stack((*p, -states[model.spin_state] / reach, reach)), states[list(RATTLE)]])
-    found = np.empty((len(some), 2))
-    compiled_foresee(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), check, found)
+    tables, starts = np.empty((len(some), 5, TERMS), complex), np.empty((len(some), 8))
+    followed = np.empty(len(some), bool)
+    compiled_exchange(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), tables, starts, followed)
     slower, faster = rates[some, :2].imag.T
-    result.reversals[possible[some]] = found[:, 0]
     # Slip that decays more slowly than the faster mode turns acts on its own.
     apart = (3 * slower > (1 + _BELOW_THREE) * faster) & (rates[some, 4:].real < -faster[:, None]).all(axis=1)
-    result.sure[possible[some]] = (found[:, 1] > 0) & apart
+    counts, sure = _counts(tables, starts, check & followed & apart)
+    result.reversals[possible[some]], result.sure[possible[some]] = counts, sure
     return result
+
+
+def _counts(tables: Array, starts: Array, sure: Array) -> tuple[Array, Array]:
+    """Count reversals, and return whether those of the cells `sure` stay the same with all of `_FACTORS`."""
+    follow, size = compiled_follow(), len(tables)
+    counts, found, over = np.empty(size), np.empty(size), np.empty(size, bool)
+    follow(tables, starts, np.arange(size), _FACTORS[0], counts, over)
+    sure = sure & over
+    for k, factors in enumerate(_FACTORS[1:], 1):
+        cells = np.flatnonzero(sure & ((k < _WITHOUT_COUPLE) | (starts[:, 5] > 0)))
+        follow(tables, starts, cells, factors, found, over)
+        sure[cells] = found[cells] == counts[cells]
+    return counts, sure
 
 
 def _modes_of_bodies(model: Model, p: Any) -> tuple[Array, Array]:
@@ -95,11 +110,7 @@ def _modes_of_bodies(model: Model, p: Any) -> tuple[Array, Array]:
 
 def _modes_at_rest(model: Model, p: Any) -> tuple[Array, Array]:
     """Rates and modes: the slower rocking, the faster one, their conjugates, and the decay of the slip."""
-    rattle = list(RATTLE)
-    states = np.zeros((len(model.states), len(rattle), len(p[0])))
-    states[rattle, range(len(rattle))] = _SMALL
-    slopes = stack(model.rhs(states, p)[0])[rattle] / _SMALL  # exact, because the equations are odd in the rattle
-    rates, modes = np.linalg.eig(np.moveaxis(slopes, -1, 0))
+    rates, modes = np.linalg.eig(jacobian(model, p, np.zeros_like(p[0])))
     order = np.argsort(-rates.imag, axis=1)[:, [1, 0, 4, 5, 2, 3]]
     return np.take_along_axis(rates, order, axis=1), np.take_along_axis(modes, order[:, None, :], axis=2)
 
@@ -117,34 +128,31 @@ def _of_unit_energy(model: Model, p: Any, modes: Array) -> Array:
 
 
 @cache
-def compiled_foresee(model: Model) -> Cached:
-    """Compiled (rows, E, E⁻¹, check, found) -> None: `foresee` for rows of constants, spin, reach and rattle."""
+def compiled_exchange(model: Model) -> Cached:
+    """Compiled (rows, E, E⁻¹, tables, starts, followed) -> None: what `make_follow` needs of each cell.
+
+    A row has the constants, the spin, the reach and the rattle; `followed` is as of `make_exchange`.
+    """
     record, n = model.constants, len(model.constants._fields)
     load = compile_inline("load", "row", [f"return Of{tuple_of(f'row[{i}]' for i in range(n))}"], {"Of": record})
-    (exchange, begin), follow = make_exchange(model), make_follow()
+    exchange, begin = make_exchange(model)
 
-    def run(rows, E, inverse, check, found):
-        size = len(rows)
-        tables, starts, bent = np.empty((size, 5, TERMS), E.dtype), np.empty((size, 8)), np.empty(2)
-        for i in range(size):
+    def run(rows, E, inverse, tables, starts, followed):
+        bent = np.empty(2)
+        for i in range(len(rows)):
             p, spin, reach = load(rows[i]), rows[i, n], rows[i, n + 1]
-            d, followed = exchange(p, reach, E[i], inverse[i], tables[i], bent)
-            a1, a2, spin = begin(rows[i, n + 2 :], spin, p, reach, E[i], inverse[i])
+            d, at_nodes = exchange(p, reach, E[i], inverse[i], tables[i], bent)
+            a1, a2, spin, at_start = begin(rows[i, n + 2 :], spin, p, reach, E[i], inverse[i])
             start = (a1.real, a1.imag, a2.real, a2.imag, spin, d, bent[0], bent[1])
             for k in range(8):
                 starts[i, k] = start[k]
-            found[i, 1] = 1.0 if followed and check else 0.0
-        counts, over, cells = np.empty(size), np.empty(size), np.empty(size, np.int64)
-        for k in range(len(_FACTORS) if check else 1):
-            some = 0
-            for i in range(size):
-                if k == 0 or (found[i, 1] > 0.0 and (k < _WITHOUT_COUPLE or starts[i, 5] > 0.0)):
-                    cells[some], some = i, some + 1
-            follow(tables, starts, cells[:some], _FACTORS[k], counts, over)
-            for i in cells[:some]:
-                if k == 0:
-                    found[i, 0], found[i, 1] = counts[i], min(found[i, 1], over[i])
-                elif counts[i] != found[i, 0]:
-                    found[i, 1] = 0.0
+            followed[i] = at_nodes and at_start
 
-    return serial(run, "(f8[:, ::1], c16[:, :, ::1], c16[:, :, ::1], b1, f8[:, ::1])", f"foreseen-{model.key}")
+    types = "(f8[:, ::1], c16[:, :, ::1], c16[:, :, ::1], c16[:, :, ::1], f8[:, ::1], b1[::1])"
+    return serial(run, types, f"exchange-{model.key}")
+
+
+@cache
+def compiled_follow() -> Cached:
+    """Compiled `make_follow`, the same for all models."""
+    return serial(make_follow(), "(c16[:, :, ::1], f8[:, ::1], i8[::1], f8[::1], f8[::1], b1[::1])", "follow")
