@@ -68,10 +68,10 @@ def sound(config: Config, dataset: xr.Dataset) -> None:
         assert not (found["spin_error"][ran] < 0).any() if "spin_error" in found else True
     if "decided" in found and config.of_rattlebacks:
         model = config.equations
-        whole = {name: columns[name] for name in model.parameters}
-        with np.errstate(all="ignore"):
-            start, *_ = model.energy(model.start(whole), model.constants.of(whole))
-        known = (found["decided"] == 1) & (start != 0) & ran
+        of_ran = {name: columns[name][ran] for name in model.parameters}  # impossible bodies have no constants
+        start = np.zeros(len(status))
+        start[ran], *_ = model.energy(model.start(of_ran), model.constants.of(of_ran))
+        known = (found["decided"] == 1) & (start != 0)
         odd = np.sign(start) * np.sign(found["spin_final"]) != (-1.0) ** found["reversals"]
         assert not (odd & known).any(), f"parity of {_first(found, odd & known)}"
     if "reversals" in found:
