@@ -244,7 +244,7 @@ def test_the_finding_says_how_far_the_formula_is_off() -> None:
     assert said
     line = sweep.predict(ROOT / "configs" / "mu.yaml")
     ratios = np.concatenate([line[f"{n}_linear"] / line[n] for n in ("n_c1_plus", "n_c1_minus")])
-    assert [int(number) for number in said.groups()] == [round(100 * (r - 1)) for r in (ratios.min(), ratios.max())]
+    assert [int(number) for number in said.groups()] == [round(100 * (1 - 1 / r)) for r in (ratios.min(), ratios.max())]
 
 
 @pytest.mark.campaign
