@@ -194,7 +194,7 @@ def changes(
 
     Parameters
     ----------
-    config : one body and one start, otherwise as for `run`; with viscous friction and without couples
+    config : one body and one start, otherwise as for `run`; with viscous friction and without couples except `sigma`
     reversals : how many reversals more, at least; negative for fewer
     progress, reporter, overrides : as for `run`
 

@@ -198,6 +198,21 @@ def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     xr.testing.assert_equal(opened.sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20))
 
 
+@pytest.mark.parametrize(
+    "several", [{"mu": [40, 60], "b": [2, 3]}, {"cases": {"mu": [40, 40, 60, 60], "b": [2, 3, 2, 3]}}]
+)
+def test_a_selected_cell_is_the_one_that_is_followed(several: dict[str, Any]) -> None:
+    """Also one of a table, of part of an axis, and of a dataset of trajectories."""
+    cells = sweep.run({"model": "averaged", "integrator": {"t_end": 20}}, **several)
+    one, kept = ({"case": -1}, {"case": [-1]}) if "cases" in several else ({"mu": 1, "b": 1}, {"mu": [1], "b": [1]})
+    expected = sweep.trajectory({"model": "averaged", "friction": {"mu": 60}, "integrator": {"t_end": 20}}, b=3)
+    for selected in (cells.isel(one), cells.isel(kept)):
+        followed = selected.sweep.trajectory()
+        same_numbers(followed, expected)
+        same_numbers(followed.sweep.trajectory(), expected)
+        same_numbers(followed.isel(trajectory=0).sweep.trajectory(), expected)
+
+
 @pytest.mark.parametrize("name", ["cells.csv", "a name with spaces so long that YAML folds it, onto one more line.csv"])
 def test_a_dataset_needs_no_other_file_for_its_trajectories(tmp_path: Path, name: str) -> None:
     """The first of its cases stands in for the table."""

@@ -123,6 +123,13 @@ def plot(
         raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
     if figsize is not None and width is not None:
         raise fault_of("also sets the width; give either width or figsize", "figsize")
+    if figsize is not None and max(figsize) > (most := _WIDEST / 0.0254):
+        raise fault_of(f"{figsize[0]:g} × {figsize[1]:g} inches; give at most {most:.3g} inches", "figsize")
+    if ax is not None and (
+        given := [name for name, each in (("width", width), ("figsize", figsize)) if each is not None]
+    ):
+        raise fault_of("the given axes have their own size; leave it out", given[0])
+    limits, figsize = (None if each is None else (float(each[0]), float(each[1])) for each in (limits, figsize))
     if sel is not None and not isinstance(sel, Mapping):
         raise fault_of(refusal(sel, "values by axis, such as {'n0': 0.05}"), "sel")
     if cmap is not None:

@@ -13,6 +13,9 @@ import xarray as xr
 from sweep.config import Config
 from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.kernels.measures import MEASURES
+from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.reversals import Reversals
+from sweep.models.ladder import slow
 from sweep.plots import labels, regimes
 from sweep.results.dataset import VARIABLES
 from sweep.results.probabilities import PROBABILITIES
@@ -94,6 +97,8 @@ def check_pictures(config: Config) -> None:
     """Raise a `ConfigError` if a configuration names a picture of a variable that its run does not have."""
     measured = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
     there = {variable for spec in config.measure for variable in MEASURES[spec.partition("=")[0]].variables}
+    if config.tier is slow.MODEL and Reversals.name in config.measure:
+        there |= {*Foreseen.variables}
     known = {*VARIABLES, *PROBABILITIES, *DERIVED}
     for i, name in enumerate(config.picture):
         needs = DERIVED[name].needs if name in DERIVED else (name,)

@@ -14,7 +14,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, Normalize
 
-from sweep.faults import fault_of
+from sweep.faults import brief, fault_of
 from sweep.grid import Array
 
 Limits = tuple[float, float]
@@ -58,8 +58,10 @@ class Scale:
 
 def colour_map(name: str) -> Colormap:
     """Look up a colour map of matplotlib; `ConfigError` if the name is unknown."""
-    if name not in mpl.colormaps:
-        raise fault_of(f"there is no colour map {name}; choose one of matplotlib's, such as viridis or cividis", "cmap")
+    if not isinstance(name, str) or name not in mpl.colormaps:
+        raise fault_of(
+            f"there is no colour map {brief(str(name))}; choose one of matplotlib's, such as viridis or cividis", "cmap"
+        )
     return mpl.colormaps[name]
 
 

@@ -12,12 +12,15 @@ from sweep.ended import without_ended
 from sweep.faults import fault_of
 from sweep.grid import CASE
 from sweep.kernels.measures.misfit import Misfit
+from sweep.results.kind import RUN, TRAJECTORY, kind, parameters
 
 
 def configuration(
     dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
 ) -> Config:
-    """Return the configuration of a dataset without its film; a table of cases is replaced by its first case.
+    """Return the configuration of a dataset, or of the part of it that was selected, without its film.
+
+    A table of cases is replaced by its first case.
 
     Parameters
     ----------
@@ -33,11 +36,20 @@ def configuration(
     if not isinstance(values, dict):
         raise fault_of("a configuration is a mapping of keys to values", "config")
     values = without_ended(values)
-    values.pop("cases", None)
+    cases = values.pop("cases", None)
     if isinstance(measure := values.get("measure"), list):
         values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]
-    first = {str(name): float(c[0]) for name, c in dataset.coords.items() if c.dims == (CASE,) and name != CASE}
+    stored = {name: value for each in values.values() if isinstance(each, dict) for name, value in each.items()}
+    first = {}
+    for name in parameters(dataset):
+        column, varies = dataset[name], isinstance(stored.get(name, [] if cases else 0.0), list | dict)
+        selected = column.ndim == 0 and varies and kind(dataset) in (RUN, TRAJECTORY)
+        if "distribution" not in column.attrs and (selected or column.dims in ((CASE,), (TRAJECTORY.name,))):
+            first[name] = float(column.values.flat[0])
     named = dict(model or {})
-    return load_config(
+    whole = load_config(
         values, first | named, argument=lambda key: "--model" if key in named else key, announce=announce
     )
+    parts = {name: dataset[name].values.tolist() for name, axis in whole.axes.items()
+             if name in dataset.dims and dataset.sizes[name] < len(axis)}  # fmt: skip
+    return load_config(whole, parts) if parts else whole

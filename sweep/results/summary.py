@@ -221,7 +221,7 @@ def accuracy(dataset: xr.Dataset) -> Iterator[str]:
         rules = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
         who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in rules.items())
         yield f"step: {step.min():.3g} to {step.max():.3g}{f', set by {who}' if who else ''}"
-    if "wall_time" in dataset.attrs:
+    if dataset.attrs.get("wall_time"):
         rate = dataset.attrs.get("trajectories_per_second", np.nan)
         yield f"cost: {duration(dataset.attrs['wall_time'])}, {rate:.3g} trajectories/s"
 

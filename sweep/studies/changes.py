@@ -13,9 +13,11 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config
+from sweep.config.document import plain_data
+from sweep.config.values import Values
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import run
-from sweep.faults import fault_of
+from sweep.faults import fault_of, refusal
 from sweep.grid import Array
 from sweep.models.general import starts
 from sweep.models.general.surfaces import SURFACES
@@ -50,17 +52,21 @@ class _Bracket:
         return np.asarray(self.near * (self.far / self.near) ** (np.arange(1, _TOGETHER + 1) / _TOGETHER))
 
     def narrow(self, counts: Array, reach: Array) -> bool:
-        """Keep the first part at whose end the count is one to `reach`; return whether there is one."""
-        if reach.any():
-            first, ends = int(np.argmax(reach)), [self.near, *self.places()]
-            self.near, self.far, self.count = ends[first], ends[first + 1], int(counts[first])
-        return bool(reach.any())
+        """Keep the first part at whose end the count is one to `reach`; return whether there is one.
+
+        There is none behind a count that is not decided, which may be one to `reach` as well.
+        """
+        first, ends = int(np.argmax(reach)), [self.near, *self.places()]
+        if not reach[first] or (counts[:first] < 0).any():
+            return False
+        self.near, self.far, self.count = ends[first], ends[first + 1], int(counts[first])
+        return True
 
 
 def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
     """Arguments of `sweep.api.changes`."""
-    if not reversals:
-        raise fault_of("must not be 0; give 1 for one reversal more, -1 for one less", "reversals")
+    if isinstance(reversals, bool) or not isinstance(plain_data(reversals), int) or not reversals:
+        raise fault_of(refusal(reversals, "a whole number: 1 for one reversal more, -1 for one less"), "reversals")
     cell = _cell(config)
     now = int(_counts(config, {name: np.array([value]) for name, value in cell.items()}, reporter)[0])
     if now < 0:
@@ -79,12 +85,12 @@ def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
 
 def _cell(config: Config) -> dict[str, float]:
     """Return the parameters of the only cell of a configuration; raise a `ConfigError` if there are more."""
+    if ENDING not in config.tier.offers:
+        raise config.error(("model",), "has no foreseen counts; choose the model slip with viscous friction")
     require_certain(config)
     if config.grid.size > 1:
         name = next(name for name, values in {**config.axes, **config.cases}.items() if len(values) > 1)
         raise config.error(name, "has several values; give a single one")
-    if ENDING not in config.equations.offers:
-        raise config.error(("model",), "has no foreseen counts; choose viscous friction")
     return {name: float(column[0]) for name, column in config.grid.columns().items()}
 
 
@@ -132,6 +138,7 @@ def _counts(config: Config, columns: Mapping[str, Array], reporter: Reporter) ->
 
 def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapping[str, _Bracket]) -> xr.Dataset:
     """Label the brackets; a parameter without one has NaN and the present count."""
+    alone = replace(config, parameters={name: Values.one(value) for name, value in cell.items()}, cases={})
     names = [name for name, value in cell.items() if value]
     nothing = _Bracket(np.nan, np.nan, now)
     rows = [(cell[name], brackets.get(name, nothing)) for name in names]
@@ -143,5 +150,5 @@ def _dataset(config: Config, cell: Mapping[str, float], now: int, brackets: Mapp
         "reversals": ([each.count for _, each in rows], "spin reversals there, simulated"),
     }
     variables = {name: ("parameter", values, {"long_name": meaning}) for name, (values, meaning) in columns.items()}
-    attributes = {"title": f"{config.name}: changes of {now} reversals", "config": config.label(), "reversals": now}
+    attributes = {"title": f"{config.name}: changes of {now} reversals", "config": alone.label(), "reversals": now}
     return xr.Dataset(variables, {"parameter": names}, {ATTRIBUTE: CHANGES.name, **attributes})

@@ -4,6 +4,7 @@ import tracemalloc
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
@@ -287,6 +288,10 @@ def test_axes_in_any_order_of_values() -> None:
         ({"figsize": (1,)}, r"figsize: must be a width and a height in inches, such as \(6, 4\), not \(1,\)"),
         ({"figsize": (0, 2)}, "figsize: must be a width"),
         ({"figsize": (3, 2), "width": "85mm"}, "figsize: also sets the width"),
+        ({"figsize": np.array([50, 5])}, "figsize: 50 × 5 inches; give at most 39.4"),
+        ({"figsize": (3, 2), "ax": Figure().subplots()}, "figsize: the given axes have their own size"),
+        ({"width": "85mm", "ax": Figure().subplots()}, "width: the given axes have their own size"),
+        ({"cmap": mpl.colormaps["magma"]}, "cmap: there is no colour map <matplotlib"),
         ({"sel": ["n0"]}, "sel: must be values by axis"),
         ({"width": 3}, "width: 3; give a length between 50 and 1000 mm"),
         ({"limits": (0, 2), "variable": "ratio", "ax": Figure().subplots()}, r"limits: 0..2; give numbers above zero"),
@@ -298,6 +303,12 @@ def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
     whole = 1.0 * made().reversals
     with pytest.raises(ConfigError, match=f"^{said}"):
         picture.plot(made().assign(t_first_reversal=whole, t_first_reversal_predicted=2 * whole), **wrong)
+
+
+def test_limits_and_sizes_may_be_arrays() -> None:
+    given = picture.plot(made(), "reversals", limits=np.array([0, 5]), figsize=np.array([8, 6]))
+    assert given.get_size_inches().tolist() == [8, 6]
+    assert mesh(maps(given)[0]).get_clim() == mesh(maps(picture.plot(made(), "reversals", limits=(0, 5)))[0]).get_clim()
 
 
 def test_curves_tell_lower_bounds_and_crossings() -> None:

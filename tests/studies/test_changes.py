@@ -54,6 +54,14 @@ def test_the_nearest_change_is_found_and_none_is_made_up() -> None:
     assert (sweep.run(BODY, b=np.geomspace(1.5, 6, 61).tolist()).reversals <= 3).all()
 
 
+def test_no_change_is_called_the_nearest_behind_an_undecided_count() -> None:
+    """Before this time some counts are not decided, and δ = 0.0436 would be called unchanged: it is not."""
+    early, late = (sweep.changes(BODY, t_end=end).sel(parameter="delta") for end in (2500.0, 5000.0))
+    assert late.changed_at < 0.0433
+    assert np.isnan(early.changed_at)
+    assert early.reversals == 3
+
+
 def test_no_start_off_the_body_is_tried() -> None:
     """At twice its distance, or on a body half as long, it would lie there, and NumPy would warn of a root."""
     found = sweep.changes(BODY, x0=6.0, reversals=-1)
@@ -78,8 +86,8 @@ def test_a_body_in_si_changes_alike() -> None:
     [
         ({"mu": [60, 70]}, "mu: has several values"),
         ({"friction": {"law": "coulomb", "mu": 0.2, "speed": 0.01}}, "has no foreseen counts"),
-        ({"model": "slow"}, "is not simulated"),
-        ({"reversals": 0}, "reversals: must not be 0"),
+        ({"model": "slow"}, "has no foreseen counts; choose the model slip"),
+        *(({"reversals": wrong}, "reversals: must be a whole number") for wrong in (0, 1.5, np.nan, True, "1", None)),
         ({"n0": {"normal": [0.05, 0.01]}}, "is a distribution"),
         ({"t_end": 100.0}, "not decided"),
     ],

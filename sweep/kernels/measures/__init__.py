@@ -18,7 +18,7 @@ from sweep.kernels.measures.raw_reversals import RawReversals
 from sweep.kernels.measures.resting_spin import RestingSpin
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
-from sweep.models.model import Tier
+from sweep.models.model import Model, Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
     Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Cycles,
@@ -45,8 +45,11 @@ def with_decay(measurements: tuple[Measurement, ...], tier: Tier) -> tuple[Measu
 
 
 def possible(tier: Tier) -> tuple[str, ...]:
-    """Names of the measurements that a model supports."""
-    return tuple(name for name, kind in MEASURES.items() if kind.asks in tier.offers)
+    """Names of the measurements that a model supports: one without a kernel has counts alone."""
+    simulated = isinstance(tier, Model)
+    return tuple(
+        name for name, kind in MEASURES.items() if kind.asks in tier.offers and (simulated or kind is Reversals)
+    )
 
 
 def default(tier: Tier) -> tuple[str, ...]:
