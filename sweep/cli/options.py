@@ -78,10 +78,10 @@ announce = partial(say, err=True)
 
 
 def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """Return the values of `--at` by parameter, such as 60 or "12 cm"."""
-    from sweep.config.document import number
+    """Return the values of `--at` by parameter, such as 60, "12 cm" or a range."""
+    from sweep.config.document import parse_value
 
-    given: dict[str, list[float | str]] = {}
+    given: dict[str, list[Any]] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if name not in known:
@@ -89,7 +89,7 @@ def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str
             refuse(f"--at {brief(text)}", f"unknown parameter{meant}; the parameters are {', '.join(known)}")
         if not (equals and value.strip()):
             refuse(f"--at {brief(text)}", "must be NAME=VALUE, such as mu=60 or a=12cm")
-        given.setdefault(name, []).append(value if (parsed := number(value)) is None else parsed)
+        given.setdefault(name, []).append(parse_value(value, f"--at {name}"))
     return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
 
 

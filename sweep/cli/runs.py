@@ -31,7 +31,7 @@ DRY_RUN = click.option(
 )
 AT = click.option(
     "--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun,
-    help="Parameter of the cell to follow, e.g. --at mu=60 --at b=3; repeat a parameter to follow several cells.",
+    help="Parameter of the cell to follow, e.g. --at mu=60 --at b=3; several values give several cells.",
 )  # fmt: skip
 FRESH = click.option("--fresh", is_flag=True, help="Discard the files of an earlier run instead of resuming it.")
 
