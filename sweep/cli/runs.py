@@ -60,6 +60,8 @@ def run(config: Config, rerun: str | None, **how: Any) -> None:
     from sweep.engine.run import run as run_sweep
     from sweep.results.summary import failed_fraction
 
+    if rerun and how["dry_run"]:
+        refuse("--dry-run", "estimates whole runs only; leave out --rerun")
     work = partial(run_sweep, config, rerun=rerun)
     if (result := _written(config, "run", work, partial(estimate, config), **how)) is None:
         return

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write
+from support.cli import invoke, refused
 from support.physics import TURNS, stone
 from support.runs import Heard, Stop, same_numbers
 
@@ -253,4 +254,5 @@ def test_rerun_needs_a_dataset_that_was_not_refined(write: Write, tmp_path: Path
     grown(write, tmp_path / "out", SINGLE)
     with pytest.raises(StoreError, match="leave out one of the two"):
         grown(write, tmp_path / "out", SINGLE, rerun="limit", fresh=True)
+    refused(invoke("run", write(ONE), "--rerun", "limit", "--dry-run"), "--dry-run: estimates whole runs only")
     assert (tmp_path / "out" / "small.nc").exists()
