@@ -580,7 +580,7 @@ class Accessor:
         return plot(self._dataset, variable, **options)
 
     def trajectory(self, **values: Any) -> xr.Dataset:
-        """Follow individual cells with dense output, using the configuration of the dataset.
+        """Follow cells of the dataset, or of what was selected of it, with dense output and its configuration.
 
         Parameters
         ----------

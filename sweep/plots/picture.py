@@ -115,21 +115,17 @@ def plot(
     """
     if output is not None and suffix(Path(output)) not in PICTURES:
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
-    if limits is not None and not (_is_pair(limits) and limits[0] < limits[1]):
-        raise fault_of(refusal(limits, "a lower and a higher finite number, such as (0, 5)"), "limits")
+    limits = _pair(limits, "limits", "a lower and a higher finite number, such as (0, 5)", lambda low, high: low < high)
     if limits is not None and max(map(abs, limits)) > scales.LARGEST:
         raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {scales.LARGEST:g}", "limits")
-    if figsize is not None and not (_is_pair(figsize) and min(figsize) > 0):
-        raise fault_of(refusal(figsize, "a width and a height in inches, such as (6, 4)"), "figsize")
+    figsize = _pair(figsize, "figsize", "a width and a height in inches, such as (6, 4)", lambda *both: min(both) > 0)
     if figsize is not None and width is not None:
         raise fault_of("also sets the width; give either width or figsize", "figsize")
     if figsize is not None and max(figsize) > (most := _WIDEST / 0.0254):
         raise fault_of(f"{figsize[0]:g} × {figsize[1]:g} inches; give at most {most:.3g} inches", "figsize")
-    if ax is not None and (
-        given := [name for name, each in (("width", width), ("figsize", figsize)) if each is not None]
-    ):
-        raise fault_of("the given axes have their own size; leave it out", given[0])
-    limits, figsize = (None if each is None else (float(each[0]), float(each[1])) for each in (limits, figsize))
+    for option, size in (("width", width), ("figsize", figsize)):
+        if ax is not None and size is not None:
+            raise fault_of("the given axes have their own size; leave it out", option)
     if sel is not None and not isinstance(sel, Mapping):
         raise fault_of(refusal(sel, "values by axis, such as {'n0': 0.05}"), "sel")
     if cmap is not None:
@@ -246,10 +242,15 @@ def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | Non
         raise fault_of(f"{name} is drawn as a curve, which has no colour scale; leave it out", "cmap")
 
 
-def _is_pair(given: Any) -> bool:
-    """Return whether an argument is a pair of finite numbers."""
-    there = plain_data(given)
-    return isinstance(there, list) and len(there) == 2 and all(is_number(n) and isfinite(n) for n in there)
+def _pair(given: Any, option: str, wanted: str, fits: Callable[[float, float], bool]) -> tuple[float, float] | None:
+    """Return an argument that has to be a pair of finite numbers that fit; None if it is not given."""
+    if given is None:
+        return None
+    pair = plain_data(given)
+    finite = isinstance(pair, list) and len(pair) == 2 and all(is_number(n) and isfinite(n) for n in pair)
+    if not (finite and fits(*pair)):
+        raise fault_of(refusal(given, wanted), option)
+    return float(pair[0]), float(pair[1])
 
 
 def inches(width: str) -> float:

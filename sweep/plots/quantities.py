@@ -15,7 +15,6 @@ from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.reversals import Reversals
-from sweep.models.ladder import slow
 from sweep.plots import labels, regimes
 from sweep.results.dataset import VARIABLES
 from sweep.results.probabilities import PROBABILITIES
@@ -95,14 +94,14 @@ def pictured(dataset: xr.Dataset) -> list[str]:
 
 def check_pictures(config: Config) -> None:
     """Raise a `ConfigError` if a configuration names a picture of a variable that its run does not have."""
-    measured = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
-    there = {variable for spec in config.measure for variable in MEASURES[spec.partition("=")[0]].variables}
-    if config.tier is slow.MODEL and Reversals.name in config.measure:
-        there |= {*Foreseen.variables}
+    comes_with = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
+    if config.tier.counts in Foreseen.variables:  # the reversals of this tier are foreseen
+        comes_with |= dict.fromkeys(Foreseen.variables, Reversals.name)
+    measured = {spec.partition("=")[0] for spec in config.measure}
     known = {*VARIABLES, *PROBABILITIES, *DERIVED}
     for i, name in enumerate(config.picture):
         needs = DERIVED[name].needs if name in DERIVED else (name,)
-        lacking = sorted({measured[each] for each in needs if each in measured and each not in there})
+        lacking = sorted({comes_with[each] for each in needs if each in comes_with} - measured)
         words = f"{name} is not measured; add {', '.join(lacking)} to measure" if lacking else ""
         if name not in known:
             words = refusal(name, f"a variable, such as {either(sorted(DERIVED))}", known)

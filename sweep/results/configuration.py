@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import xarray as xr
 
@@ -20,7 +21,7 @@ def configuration(
 ) -> Config:
     """Return the configuration of a dataset, or of the part of it that was selected, without its film.
 
-    A table of cases is replaced by its first case.
+    A table of cases, or of trajectories, is replaced by its first one.
 
     Parameters
     ----------
@@ -39,17 +40,22 @@ def configuration(
     cases = values.pop("cases", None)
     if isinstance(measure := values.get("measure"), list):
         values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]
-    stored = {name: value for each in values.values() if isinstance(each, dict) for name, value in each.items()}
-    first = {}
-    for name in parameters(dataset):
-        column, varies = dataset[name], isinstance(stored.get(name, [] if cases else 0.0), list | dict)
-        selected = column.ndim == 0 and varies and kind(dataset) in (RUN, TRAJECTORY)
-        if "distribution" not in column.attrs and (selected or column.dims in ((CASE,), (TRAJECTORY.name,))):
-            first[name] = float(column.values.flat[0])
+    selected = _selected(dataset, values, of_table=cases is not None)
     named = dict(model or {})
-    whole = load_config(
-        values, first | named, argument=lambda key: "--model" if key in named else key, announce=announce
+    return load_config(
+        values, selected | named, argument=lambda key: "--model" if key in named else key, announce=announce
     )
-    parts = {name: dataset[name].values.tolist() for name, axis in whole.axes.items()
-             if name in dataset.dims and dataset.sizes[name] < len(axis)}  # fmt: skip
-    return load_config(whole, parts) if parts else whole
+
+
+def _selected(dataset: xr.Dataset, stored: Mapping[str, Any], *, of_table: bool) -> dict[str, Any]:
+    """Return the values that the dataset has of parameters that vary in the stored configuration."""
+    given = {name: value for each in stored.values() if isinstance(each, dict) for name, value in each.items()}
+    cells, found = kind(dataset) in (RUN, TRAJECTORY), dict[str, Any]()
+    for name in parameters(dataset):
+        column = dataset[name]
+        varies = isinstance(given[name], list | dict) if name in given else of_table
+        if column.dims in ((CASE,), (TRAJECTORY.name,)):
+            found[name] = float(column[0])
+        elif cells and varies and column.dims in ((), (name,)) and "distribution" not in column.attrs:
+            found[name] = column.values.tolist()
+    return found

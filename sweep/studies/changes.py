@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config
-from sweep.config.document import plain_data
+from sweep.config.document import is_number, plain_data
 from sweep.config.values import Values
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import run
@@ -54,7 +54,7 @@ class _Bracket:
     def narrow(self, counts: Array, reach: Array) -> bool:
         """Keep the first part at whose end the count is one to `reach`; return whether there is one.
 
-        There is none behind a count that is not decided, which may be one to `reach` as well.
+        There is none beyond a count that is not decided: it may be one to `reach` as well.
         """
         first, ends = int(np.argmax(reach)), [self.near, *self.places()]
         if not reach[first] or (counts[:first] < 0).any():
@@ -65,7 +65,8 @@ class _Bracket:
 
 def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
     """Arguments of `sweep.api.changes`."""
-    if isinstance(reversals, bool) or not isinstance(plain_data(reversals), int) or not reversals:
+    more = plain_data(reversals)
+    if not (is_number(more) and isinstance(more, int) and more):
         raise fault_of(refusal(reversals, "a whole number: 1 for one reversal more, -1 for one less"), "reversals")
     cell = _cell(config)
     now = int(_counts(config, {name: np.array([value]) for name, value in cell.items()}, reporter)[0])

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config import Config
-from sweep.config.document import is_number
+from sweep.config.document import is_number, plain_data
 from sweep.engine.cluster import connected
 from sweep.engine.errors import ROUND_OFF
 from sweep.engine.estimate import estimate
@@ -74,7 +74,7 @@ def require_simulated(config: Config) -> None:
 
 def require_between(option: str, value: float, ends: tuple[float, float]) -> None:
     """Raise a `ConfigError` if the value of an option is not between these."""
-    if not (is_number(value) and ends[0] <= value <= ends[1]):
+    if not (is_number(plain_data(value)) and ends[0] <= value <= ends[1]):
         raise fault_of(f"must be between {ends[0]:g} and {ends[1]:g}, not {quote(value)}", option)
 
 

@@ -279,10 +279,8 @@ def test_elementary_functions_are_those_of_numpy() -> None:
 
 @pytest.mark.x86
 def test_the_steps_are_vector_instructions() -> None:
-    steps = follow.make_follow()
-    made = compiled(lambda tables, starts, cells, factors, counts, over: steps(
-        tables, starts, cells, factors, counts, over))  # fmt: skip
-    made.compile("(c16[:, :, ::1], f8[:, ::1], i8[::1], f8[::1], f8[::1], f8[::1])")
+    made = compiled(follow.make_follow())
+    made.compile(slow.compiled_follow()._types)
     (assembly,) = made.inspect_asm().values()
     # There are scalar loops as well, for arrays that overlap, which they never do.
     assert assembly.count("divpd") > 44

@@ -54,7 +54,7 @@ def test_the_nearest_change_is_found_and_none_is_made_up() -> None:
     assert (sweep.run(BODY, b=np.geomspace(1.5, 6, 61).tolist()).reversals <= 3).all()
 
 
-def test_no_change_is_called_the_nearest_behind_an_undecided_count() -> None:
+def test_no_change_is_reported_beyond_an_undecided_count() -> None:
     """Before this time some counts are not decided, and δ = 0.0436 would be called unchanged: it is not."""
     early, late = (sweep.changes(BODY, t_end=end).sel(parameter="delta") for end in (2500.0, 5000.0))
     assert late.changed_at < 0.0433
