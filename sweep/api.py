@@ -22,22 +22,23 @@ if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.figure import Figure
 
-    from sweep.config import Config, ConfigError, ConfigLike, load_config
+    from sweep.config import Config, ConfigLike, load_config
     from sweep.config.film import Film
     from sweep.engine.reporter import Reporter
     from sweep.explorer.server import Beside
+    from sweep.faults import Error, FileError, InputError
     from sweep.plots.picture import plot
-    from sweep.results.store import StoreError
 
 __all__ = [
-    "Config", "ConfigError", "StoreError", "animate", "boundaries", "changes", "critical", "explore", "fit", "indices",
-    "load_config", "open", "plot", "predict", "run", "trajectory",
+    "Config", "Error", "FileError", "InputError", "animate", "boundaries", "changes", "critical", "explore", "fit",
+    "indices", "load_config", "open_dataset", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
 HOMES = {
     "Config": "sweep.config",
-    "ConfigError": "sweep.config",
-    "StoreError": "sweep.results.store",
+    "Error": "sweep.faults",
+    "FileError": "sweep.faults",
+    "InputError": "sweep.faults",
     "load_config": "sweep.config",
     "plot": "sweep.plots.picture",
 }
@@ -112,7 +113,7 @@ def run(
 
     Raises
     ------
-    ConfigError, StoreError
+    InputError, FileError
         if the configuration, or the contents of `output`, cannot be used.
 
     Examples
@@ -163,7 +164,7 @@ def boundaries(
 
     Raises
     ------
-    ConfigError, StoreError
+    InputError, FileError
         as `run`; also if the model is not simulated, or there are fewer than two axes.
 
     Examples
@@ -207,7 +208,7 @@ def changes(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the configuration has more than one cell, an undecided count, or a model without foreseen counts.
 
     Examples
@@ -252,7 +253,7 @@ def critical(
 
     Raises
     ------
-    ConfigError, StoreError
+    InputError, FileError
         as `run`; also if the model is not simulated, or the start point is an axis.
 
     Examples
@@ -302,7 +303,7 @@ def trajectory(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the configuration cannot be used, the model is not simulated, or a cell cannot be run.
 
     Examples
@@ -357,10 +358,10 @@ def animate(
 
     Raises
     ------
-    ConfigError
+    InputError
         as `trajectory`; also if there are too many bodies or they have no attitude, the interval is empty, the speed is
         not positive, the clip is too long for its format, or the format is unknown.
-    StoreError
+    FileError
         if the file is not a dataset, or `output` cannot be written.
     """
     from pathlib import Path
@@ -426,7 +427,7 @@ def fit(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the configuration or the film cannot be used, or the configuration does not describe one body.
     """
     from sweep.studies.laws import fitted
@@ -452,7 +453,7 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
 
     Raises
     ------
-    StoreError
+    FileError
         if the dataset has no axis, or was cut or averaged.
     ModuleNotFoundError
         if Bokeh is not installed.
@@ -494,7 +495,7 @@ def indices(
 
     Raises
     ------
-    ConfigError, StoreError
+    InputError, FileError
         as `run`; also if the model is not simulated, no parameter is a distribution, or one is an axis.
     """
     from sweep.studies.indices import indices
@@ -515,7 +516,7 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
 
     Raises
     ------
-    ConfigError
+    InputError
         if the configuration cannot be used.
 
     Examples
@@ -533,7 +534,7 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     return dataset.label(checked, checked.grid, found, {"config": checked.label()})
 
 
-def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
+def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
     """Open a dataset that this program wrote.
 
     Parameters
@@ -544,13 +545,13 @@ def open(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
 
     Raises
     ------
-    StoreError
+    FileError
         if the file is not a dataset of this program, or is larger than memory.
 
     Examples
     --------
     >>> _ = sweep.run({"name": "spins", "friction": {"mu": 60}}, "runs", n0=[0.02, 0.05], t_end=100)
-    >>> sweep.open("runs/spins.nc").n0.values
+    >>> sweep.open_dataset("runs/spins.nc").n0.values
     array([0.02, 0.05])
     """
     from pathlib import Path
@@ -588,7 +589,7 @@ class Accessor:
 
         Raises
         ------
-        ConfigError
+        InputError
             if the dataset contains no configuration, or if the model is user-defined, because its code runs only if you
             pass the configuration to `sweep.trajectory`; otherwise as for `sweep.trajectory`.
         """

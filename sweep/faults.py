@@ -93,12 +93,16 @@ class Fault:
         return printable(": ".join(part for part in (place, spell(self.path), self.message) if part))
 
 
-class Refused(ValueError):
+class Error(ValueError):
     """An error that the user can fix, such as an unusable configuration or file; the text says how."""
 
 
-class ConfigError(Refused):
-    """A configuration that cannot be run; `faults` has an entry for each error, ordered by line."""
+class FileError(Error):
+    """A dataset or a folder cannot be used; the message names it, and says why and what to do."""
+
+
+class InputError(Error):
+    """A configuration, an argument, a film or a table is wrong; `faults` has an entry for each error, by line."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults = sorted(faults, key=lambda fault: (fault.line or 0, fault.column or 0))
@@ -111,6 +115,6 @@ class ConfigError(Refused):
         return "\n".join(lines)
 
 
-def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> ConfigError:
+def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> InputError:
     """Return the error for one fault that has no column."""
-    return ConfigError([Fault(file, line, None, path, message)])
+    return InputError([Fault(file, line, None, path, message)])

@@ -19,7 +19,7 @@ from support.runs import same_numbers
 
 import sweep
 from sweep.axis import Axis
-from sweep.config import ConfigError, load_config
+from sweep.config import InputError, load_config
 from sweep.plots.fine import critical_spins
 
 TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
@@ -71,7 +71,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], kind: str, write: Write) -> None:
     arguments, said = WRONG[kind]
     for config in (write(TEXT), SAID, load_config(SAID)):
-        with pytest.raises(ConfigError) as refusal:
+        with pytest.raises(InputError) as refusal:
             function(config, arguments) if function is load_config else function(config, **arguments)
         assert str(refusal.value).startswith(said)
         assert "\n" not in str(refusal.value)
@@ -79,9 +79,9 @@ def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], ki
 
 def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
     for cell, said in (({"mu": []}, "mu: axis is empty"), ({"x0": 20}, "start point off the ellipsoid at x0=20")):
-        with pytest.raises(ConfigError, match=f"^{said}"):
+        with pytest.raises(InputError, match=f"^{said}"):
             sweep.trajectory(SAID, **cell)
-    with pytest.raises(ConfigError, match=r"^mu: is not a parameter of the noslip model; its parameters are a, b"):
+    with pytest.raises(InputError, match=r"^mu: is not a parameter of the noslip model; its parameters are a, b"):
         sweep.trajectory({"model": "noslip"}, mu=60)
 
 
@@ -109,14 +109,14 @@ def test_overrides_of_a_config_keep_its_table_and_what_was_changed(write: Write,
 
 def test_open_takes_what_sweep_wrote_and_nothing_else(tmp_path: Path) -> None:
     written = sweep.run(SAID, tmp_path)
-    with sweep.open(str(tmp_path / "quick.nc"), load=False) as lazy:
+    with sweep.open_dataset(str(tmp_path / "quick.nc"), load=False) as lazy:
         assert not lazy.reversals._in_memory
-    opened = sweep.open(tmp_path / "quick.nc")
+    opened = sweep.open_dataset(tmp_path / "quick.nc")
     (tmp_path / "quick.nc").unlink()  # all is in memory
     xr.testing.assert_identical(opened, written)
     xr.Dataset({"other": 1}).to_netcdf(tmp_path / "other.nc")
-    with pytest.raises(sweep.StoreError, match=r"other\.nc: not a dataset of sweep"):
-        sweep.open(tmp_path / "other.nc")
+    with pytest.raises(sweep.FileError, match=r"other\.nc: not a dataset of sweep"):
+        sweep.open_dataset(tmp_path / "other.nc")
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_parts_of_a_grid_are_combined_without_loss(tmp_path: Path) -> None:
     parts = [{"mu": mu, "n0": n0} for mu in ([40, 60], [80]) for n0 in ([0.02], [0.05, 0.1])]
     for i, part in enumerate(parts):
         sweep.run(SAID, tmp_path / str(i), **part)
-    runs = [sweep.open(tmp_path / str(i) / "quick.nc") for i in range(len(parts))]
+    runs = [sweep.open_dataset(tmp_path / str(i) / "quick.nc") for i in range(len(parts))]
     combined = xr.combine_by_coords(runs[::-1], data_vars="minimal", compat="equals", combine_attrs="drop_conflicts")
     assert isinstance(combined, xr.Dataset)
     same_numbers(combined.transpose(*(wanted := sweep.run(SAID, **whole)).dims), wanted)
@@ -189,7 +189,7 @@ def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
 def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     maps = sweep.run(SAID, tmp_path, mu=[40, 60, 80, 100, 120])
     assert maps.sweep.plot("status", sel={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)
-    opened = sweep.open(tmp_path / "quick.nc")
+    opened = sweep.open_dataset(tmp_path / "quick.nc")
     xr.testing.assert_equal(opened.sweep.trajectory(mu=60, b=3), sweep.trajectory(SAID, mu=60, b=3))
     assert repr(opened.sweep).startswith(
         "<sweep: quick: reversals of a rattleback (averaged model)>\n10 cells (mu 5 × b 2)"
@@ -229,7 +229,7 @@ def test_a_dataset_needs_no_other_file_for_its_trajectories(tmp_path: Path, name
 def test_what_a_dataset_tells_has_to_be_a_configuration(text: str) -> None:
     dataset = sweep.predict(SAID)
     dataset.attrs["config"] = text
-    with pytest.raises(ConfigError, match="config"):
+    with pytest.raises(InputError, match="config"):
         dataset.sweep.trajectory()
     assert not critical_spins(dataset, Axis("mu", dataset.mu.values), Axis("b", dataset.b.values))
 
@@ -240,7 +240,7 @@ def test_a_dataset_does_not_run_the_code_of_another(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="contains no configuration; call"):
         dataset.drop_attrs().sweep.trajectory()
     dataset.attrs["config"] = f"model: {tmp_path / 'evil.py'}"
-    with pytest.raises(ConfigError, match="refusing to run user code named inside a dataset"):
+    with pytest.raises(InputError, match="refusing to run user code named inside a dataset"):
         dataset.sweep.trajectory()
 
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from support import Write
 from support.cli import invoke
 
-from sweep import ConfigError, load_config
+from sweep import InputError, load_config
 from sweep.config import document
 
 # Inputs of each kind: what a second or two allows.
@@ -64,7 +64,7 @@ def test_refusals_do_not_quote_a_file_that_is_no_table(write: Write, tmp_path: P
 
 @pytest.mark.parametrize("name", ["../../x", "/tmp/x", "a/b", "..", "", '"a\\0b"', '"a\\nb"', "x" * 101, "-x", ".x"])
 def test_a_name_cannot_leave_the_output_folder(name: str, write: Write) -> None:
-    with pytest.raises(ConfigError, match="name: "):
+    with pytest.raises(InputError, match="name: "):
         load_config(write(f"name: {name}\nfriction: {{mu: 60}}\n"))
 
 
@@ -76,9 +76,9 @@ def test_any_file_name_gives_a_valid_name(stem: str, write: Write) -> None:
 def test_no_code_in_a_file_is_executed(write: Write, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     for call in (f"!!python/object/apply:os.mkdir [{mark}]", f"!!python/object/new:os.mkdir [{mark}]"):
-        with pytest.raises(ConfigError, match="a YAML tag or anchor"):
+        with pytest.raises(InputError, match="a YAML tag or anchor"):
             load_config(write(f"friction: {{mu: {call}}}\n"))
-        with pytest.raises(ConfigError, match="a YAML tag or anchor"):
+        with pytest.raises(InputError, match="a YAML tag or anchor"):
             document.parse_value(call, "--set x")
     assert not mark.exists()
 

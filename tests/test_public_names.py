@@ -24,7 +24,7 @@ def test_every_public_name_is_documented_in_the_source(name: str) -> None:
         assert [each.arg for each in taken if not re.search(rf"^(\w+, )*{each.arg}\b.* : ", said, re.MULTILINE)] == []
 
 
-@pytest.mark.parametrize("name", ["run", "boundaries", "critical", "trajectory", "open", "predict", "plot"])
+@pytest.mark.parametrize("name", ["run", "boundaries", "critical", "trajectory", "open_dataset", "predict", "plot"])
 def test_examples_in_docstrings_hold(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (test,) = doctest.DocTestFinder(recurse=False).find(getattr(sweep, name), name, globs={"sweep": sweep})

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import click
 
 from sweep.ended import ended
-from sweep.faults import ConfigError, Fault, Refused, fault_of, printable
+from sweep.faults import Error, Fault, InputError, fault_of, printable
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import Parameter
 
@@ -29,7 +29,7 @@ def say(text: str, *, err: bool = False) -> None:
 
 
 def refuse(option: str | Path, message: str) -> NoReturn:
-    """Raise a `ConfigError` about an option or a file."""
+    """Raise a `InputError` about an option or a file."""
     raise fault_of(message, file=str(option))
 
 
@@ -39,25 +39,25 @@ def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
     options = {"": option, **{name: f"{option} {name}" for name in known}}
     try:
         yield
-    except ConfigError as error:
+    except InputError as error:
         raise _renamed(error, options) from None
 
 
-def _in_options(error: ConfigError, command: click.Command) -> ConfigError:
+def _in_options(error: InputError, command: click.Command) -> InputError:
     """Name the option in faults of an argument that was given on the command line."""
     options = {name: each.opts[0] for each in command.params if isinstance(each, click.Option)
                for name in (each.name, each.opts[0].lstrip("-"))}  # fmt: skip
     return _renamed(error, options)
 
 
-def _renamed(error: ConfigError, options: Mapping[Any, str]) -> ConfigError:
+def _renamed(error: InputError, options: Mapping[Any, str]) -> InputError:
     """Put the option in the place of the first key of a fault's path, unless the fault lies in a file."""
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)
         return fault if fault.file or first not in options else replace(fault, path=(options[first], *rest))
 
-    return ConfigError(map(named, error.faults))
+    return InputError(map(named, error.faults))
 
 
 _PACKAGE = Path(__file__).parents[1]
@@ -97,8 +97,8 @@ class Commands(click.Group):
             if not _of_user(error):
                 raise
             say(f"{error.filename or 'standard output'}: {error.strerror or error}", err=True)
-        except ConfigError as error:
+        except InputError as error:
             say(str(_in_options(error, self.commands[ctx.invoked_subcommand or ""])), err=True)
-        except Refused as error:
+        except Error as error:
             say(str(error), err=True)
         sys.exit(WRONG_INPUT)

@@ -21,7 +21,7 @@ from sweep.config.document import plain_data
 from sweep.config.messages import explain
 from sweep.config.schema import Integrator
 from sweep.config.values import Values, in_si
-from sweep.faults import ConfigError, Fault, fault_of
+from sweep.faults import Fault, InputError, fault_of
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.kernels.measures import MEASURES
@@ -35,7 +35,7 @@ from sweep.models.variants import PAPER_LAW, Physics
 from sweep.parameters import PARAMETERS, Parameter, sections
 from sweep.units import SI, TIME
 
-__all__ = ["Config", "ConfigError", "ConfigLike", "Fault", "Integrator", "Values", "load_config"]
+__all__ = ["Config", "ConfigLike", "Fault", "InputError", "Integrator", "Values", "load_config"]
 
 ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
 """A configuration, a mapping with the contents of its file, or the path of the file."""
@@ -63,7 +63,7 @@ def load_config(
 
     Raises
     ------
-    ConfigError
+    InputError
         with a `Fault` for each error.
     """
     if isinstance(config, Config) and not overrides:
@@ -81,7 +81,7 @@ def load_config(
         values = kind.model_validate(source.values | ({"cases": ""} if given else {}))
     except ValidationError as error:
         found = explain(error.errors(), kind).items()
-        raise ConfigError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
+        raise InputError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
     return _resolve(values, source, origin)
 
 
@@ -185,7 +185,7 @@ def _pictures(values: Any, source: document.Document) -> tuple[str, ...]:
 
 def _refuse(source: document.Document, misfits: Iterable[cross_checks.Misfit]) -> None:
     if found := list(misfits):
-        raise ConfigError(source.fault(path, message, at_key=True) for path, message in found)
+        raise InputError(source.fault(path, message, at_key=True) for path, message in found)
 
 
 def _given(values: Any, source: document.Document, known: Mapping[str, Parameter]) -> dict[str, Values]:

@@ -9,7 +9,7 @@ from sweep import faults
 from sweep.config import tables
 from sweep.config.document import Document, is_number
 from sweep.config.values import MAX_AXIS, in_si, instead
-from sweep.faults import ConfigError, Fault, brief, fault_of, refusal, suggestion
+from sweep.faults import Fault, InputError, brief, fault_of, refusal, suggestion
 from sweep.parameters import Parameter
 from sweep.units import ANGLE, Unit
 
@@ -36,7 +36,7 @@ def read(source: Document, known: Mapping[str, Parameter]) -> tuple[Columns, Uni
 
     Raises
     ------
-    ConfigError
+    InputError
         if the file cannot be read, or with a `Fault` for each cell that is wrong.
     """
     table = source.values["cases"]
@@ -49,12 +49,12 @@ def read(source: Document, known: Mapping[str, Parameter]) -> tuple[Columns, Uni
 def _of_file(source: Document, name: str, known: Mapping[str, Parameter]) -> tuple[Columns, Units]:
     if name.endswith(".parquet"):
         message = "Parquet files are not supported; read it with pandas and pass the DataFrame, or save it as CSV"
-        raise ConfigError([source.fault(("cases",), f"{brief(name)}: {message}")])
+        raise InputError([source.fault(("cases",), f"{brief(name)}: {message}")])
     path, text = source.read_beside("cases", name)
     table = tables.read(str(path), text)
     first = {each: i for i, each in reversed([*enumerate(table.names)])}
     if again := [i for i, each in enumerate(table.names) if first[each] != i]:
-        raise ConfigError(table.fault("duplicate column; remove one of the two", i) for i in again)
+        raise InputError(table.fault("duplicate column; remove one of the two", i) for i in again)
     if not 0 < len(table.rows) <= MAX_AXIS:
         message = f"must have 1 to {MAX_AXIS} rows under its first line, not {len(table.rows)}"
         raise fault_of(message, file=table.file)
@@ -78,7 +78,7 @@ def _checked(table: Mapping[str, Any], place: Place, known: Mapping[str, Paramet
     read = {name: in_si(known[name].units if name in known else "", column) for name, column in table.items()}
     columns = {name: column for name, (column, _) in read.items()}
     if found := [place(path, message) for path, message in _wrong(columns, known)]:
-        raise ConfigError(found)
+        raise InputError(found)
     units = {name: unit for name, (_, unit) in read.items()}
     return {name: tuple(map(float, column)) for name, column in columns.items()}, units
 

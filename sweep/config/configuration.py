@@ -18,7 +18,7 @@ from sweep.config.document import Document
 from sweep.config.film import Film
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
-from sweep.faults import ConfigError, Path
+from sweep.faults import InputError, Path
 from sweep.grid import CASE, SAMPLE, Grid
 from sweep.kernels.measures.misfit import Misfit
 from sweep.models import TIERS
@@ -106,10 +106,10 @@ class Config:
             rows.append(f"<tr><th>{escape(name)}{''.join(f'<td>{escape(word)}' for word in words)}")
         return f"<table><caption>{escape(self.name)}: {escape(self.model)}</caption>{''.join(rows)}</table>"
 
-    def error(self, at: Path | str, message: str) -> ConfigError:
+    def error(self, at: Path | str, message: str) -> InputError:
         """Return the error for a fault at the key `at`, or at a parameter, with its place in the file if known."""
         path = self.table[at].place if isinstance(at, str) else at
-        return ConfigError([(self.source or Document("")).fault(path, message, at_key=True)])
+        return InputError([(self.source or Document("")).fault(path, message, at_key=True)])
 
     @property
     def row(self) -> str:

@@ -20,7 +20,7 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from sweep.faults import ConfigError, Fault, Path, brief, fault_of
+from sweep.faults import Fault, InputError, Path, brief, fault_of
 from sweep.units import NUMERAL
 from sweep.units import number as number
 
@@ -59,11 +59,11 @@ class Document:
 
         Raises
         ------
-        ConfigError
+        InputError
             if the file cannot be read.
         """
         path = FilePath(self.file).parent / name
-        return path, text_of(path, lambda reason: ConfigError([self.fault((key,), f"{brief(str(path))}: {reason}")]))
+        return path, text_of(path, lambda reason: InputError([self.fault((key,), f"{brief(str(path))}: {reason}")]))
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> Fault:
         """Return a fault at `path`, placed at the nearest enclosing section if the document lacks that path."""
@@ -113,11 +113,11 @@ def plain_data(value: Any) -> Any:
 
 
 def read(path: FilePath) -> Document:
-    """Read a YAML file; raise a `ConfigError` that says what is wrong with it and where."""
+    """Read a YAML file; raise a `InputError` that says what is wrong with it and where."""
     text = text_of(path)
     node = _compose(text, str(path))
     if not isinstance(node, MappingNode):
-        raise ConfigError([Fault(str(path), 1, 1, (), "a configuration is a mapping of keys to values")])
+        raise InputError([Fault(str(path), 1, 1, (), "a configuration is a mapping of keys to values")])
     document = Document(str(path))
     document.values = _values(node, document)
     return document
@@ -145,12 +145,12 @@ _OTHER_FILES = {
 """What a file is whose first bytes are these, and what to do about it."""
 
 
-def text_of(path: FilePath, error_of: Callable[[str], ConfigError] | None = None) -> str:
+def text_of(path: FilePath, error_of: Callable[[str], InputError] | None = None) -> str:
     """Return the text of a file in UTF-8, or in UTF-16 if it has that byte order mark.
 
     Raises
     ------
-    ConfigError
+    InputError
         if the file cannot be read; made by `error_of` from the reason, by default a fault of the file.
     """
     try:
@@ -172,7 +172,7 @@ def _compose(text: str, file: str) -> Node | None:
     # The time ruamel takes grows with the square of the depth: a minute for a few thousand brackets.
     depths = accumulate((character in "[{") - (character in "]}") for character in text)
     if max(depths, default=0) > _DEEPEST:
-        raise ConfigError([Fault(file, None, None, (), "not YAML: nested too deeply")])
+        raise InputError([Fault(file, None, None, (), "not YAML: nested too deeply")])
     try:
         return YAML(pure=True).compose(text)  # type: ignore[no-any-return]
     except Exception as error:  # ruamel lets errors of chr(), its own recursion errors and others escape
@@ -180,7 +180,7 @@ def _compose(text: str, file: str) -> Node | None:
         words = getattr(error, "problem", None) or getattr(error, "context", None) or str(error)
         problem = "nested too deeply" if isinstance(error, RecursionError) else words.split("\n")[0]
         line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
-        raise ConfigError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
+        raise InputError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
 
 
 def _values(root: Node, document: Document) -> Any:
@@ -222,7 +222,7 @@ def _values(root: Node, document: Document) -> Any:
 
     values = convert(root, ())
     if faults:
-        raise ConfigError(faults)
+        raise InputError(faults)
     return values
 
 

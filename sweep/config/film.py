@@ -15,7 +15,7 @@ import numpy as np
 from sweep.config import tables
 from sweep.config.document import text_of
 from sweep.config.tables import GAPS, NAMED, SEPARATORS, Table
-from sweep.faults import ConfigError, brief, counted, either, fault_of, suggestion
+from sweep.faults import InputError, brief, counted, either, fault_of, suggestion
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
 from sweep.units import ANGLE, SPIN, TIME, Unit, factor
@@ -87,7 +87,7 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
 
     Raises
     ------
-    ConfigError
+    InputError
         if the file does not exist, or has no time or data column, an unknown unit, decreasing times, too few rows, or
         text instead of numbers.
     """
@@ -115,9 +115,9 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
     whole = np.flatnonzero(np.isfinite(time) & np.isfinite(value))
     if len(back := np.flatnonzero(np.diff(time[whole]) < 0)):
         words = "the time decreases; sort the rows by time"
-        raise ConfigError([table.fault(words, found["time"], int(whole[back[0] + 1]))])
+        raise InputError([table.fault(words, found["time"], int(whole[back[0] + 1]))])
     if error is not None and len(wrong := whole[~(error[whole] > 0)]):
-        raise ConfigError([table.fault("the error must be a number > 0", found["error"], int(wrong[0]))])
+        raise InputError([table.fault("the error must be a number > 0", found["error"], int(wrong[0]))])
     if what == "heading":
         value[whole] = np.unwrap(value[whole])
     every = -(-len(whole) // MOST_ROWS) or 1
@@ -194,7 +194,7 @@ def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array
     if strange := [row for row in odd if not re.search("[^\\W\\d_]", texts[row])] or odd[: len(odd) * 10 // len(cells)]:
         words = f"'{brief(texts[strange[0]], 40)}' is not a number ({len(odd)} of {len(cells)} cells)"
         words += "; write numbers only, put the unit in the header, and leave missing cells empty"
-        raise ConfigError([table.fault(words, place, strange[0])])
+        raise InputError([table.fault(words, place, strange[0])])
     return np.array([np.nan if isinstance(cell, str) else cell * scale for cell in cells])
 
 

@@ -73,7 +73,7 @@ def measured(name: str, text: str, parameter: Parameter) -> Measured:
 
     Raises
     ------
-    ConfigError
+    InputError
         if `text` is not of this form.
     """
     option, unit = _option(name), parameter.units
@@ -92,7 +92,7 @@ def of_solid(given: Given, *, whole: bool) -> str:
 
     Raises
     ------
-    ConfigError
+    InputError
         if something is missing or given twice, or if the body does not stand.
     """
     _check_names(given, [_MASS, *_AXES])
@@ -111,7 +111,7 @@ def of_shape(given: Given, file: Path) -> str:
     ------
     OSError
         if the file cannot be read.
-    ConfigError
+    InputError
         if more is given than a mass or a density, or if the shape is not closed or does not stand.
     """
     _check_names(given, [_MASS])

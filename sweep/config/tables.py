@@ -7,7 +7,7 @@ import io
 import re
 from dataclasses import dataclass, replace
 
-from sweep.faults import ConfigError, Fault, brief, counted, either, fault_of
+from sweep.faults import Fault, InputError, brief, counted, either, fault_of
 from sweep.units import WRITTEN, Unit, factor, number, unit_of
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -51,7 +51,7 @@ class Table:
 
         Raises
         ------
-        ConfigError
+        InputError
             if the table gives a unit of another quantity.
         """
         if not (written := self.units[column]):
@@ -62,7 +62,7 @@ class Table:
             known = either(WRITTEN.get(unit, ()) if unit else [str(units)] if units else ())
             words = f"its unit must be {known}" if known else "it is a pure number; leave the unit out"
             fault = self.fault(f"is in '{brief(written, 20)}'; {words}", column)
-            raise ConfigError([replace(fault, line=self.under)])
+            raise InputError([replace(fault, line=self.under)])
         return found
 
     def numbers(self, column: int) -> list[float | str]:
@@ -70,18 +70,18 @@ class Table:
 
         Raises
         ------
-        ConfigError
+        InputError
             if commas may be decimal commas or thousands separators: a column is read as a whole or not at all.
         """
         cells = [row[column] for row in self.rows]
         if commas := [cell for cell in cells if _COMMA.fullmatch(cell)]:
             if pointed := [cell for cell in cells if "." in cell and number(cell.replace(",", "")) is not None]:
                 words = f"has {commas[0]!r} and {pointed[0]!r}; use decimal points only, and no thousands separators"
-                raise ConfigError([self.fault(words, column)])
+                raise InputError([self.fault(words, column)])
             if self.separator != ";" and all(map(_THOUSANDS.fullmatch, commas)):
                 small, large = commas[0].replace(",", ".", 1), commas[0].replace(",", "")
                 words = f"{commas[0]!r} may be {small} or {large}; write one of these, or semicolons between columns"
-                raise ConfigError([self.fault(words, column, cells.index(commas[0]))])
+                raise InputError([self.fault(words, column, cells.index(commas[0]))])
             cells = [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in cells]
         return [cell if (value := number(cell)) is None else value for cell in cells]
 
@@ -98,7 +98,7 @@ def read(file: str, text: str) -> Table:
 
     Raises
     ------
-    ConfigError
+    InputError
         if a line has a different number of cells from the first, or a column has two units.
     """
     separator, ((top, header), *rows) = _lines(file, text)
@@ -113,7 +113,7 @@ def read(file: str, text: str) -> Table:
 
 
 def _lines(file: str, text: str) -> tuple[str, Lines]:
-    """Split the non-empty lines into cells, and find their separator; raise a `ConfigError` if there are none."""
+    """Split the non-empty lines into cells, and find their separator; raise a `InputError` if there are none."""
     text = _without_title(text)
     try:
         separator = _separator(text)
@@ -136,7 +136,7 @@ def _without_title(text: str) -> str:
 
 
 def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separator: str) -> None:
-    """Raise a `ConfigError` if a row has a different number of cells from the header."""
+    """Raise a `InputError` if a row has a different number of cells from the header."""
     top, columns = header[0], len(header[1])
     if not (ragged := [(line, len(row)) for line, row in rows if len(row) != columns]):
         return
@@ -150,12 +150,12 @@ def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separat
 
 
 def _united(file: str, names: list[str], over: tuple[int, list[str]], under: tuple[int, list[str]]) -> list[str]:
-    """Return the units in the header (`over`) and in the row below it; raise a `ConfigError` where they differ."""
+    """Return the units in the header (`over`) and in the row below it; raise a `InputError` where they differ."""
     (top, units), (line, below) = over, under
     for column, (unit, own) in enumerate(zip(units, below, strict=True)):
         if unit and own and unit != own:
             words = f"is in '{brief(unit, 20)}' in line {top}, and in '{brief(own, 20)}' here; give one unit"
-            raise ConfigError([Fault(file, line, column + 1, (names[column],), words)])
+            raise InputError([Fault(file, line, column + 1, (names[column],), words)])
     return [unit or own for unit, own in zip(units, below, strict=True)]
 
 

@@ -13,7 +13,7 @@ from sweep.config.configuration import Config
 from sweep.config.document import Document
 from sweep.config.schema import SETTINGS
 from sweep.ended import ENDED
-from sweep.faults import ConfigError, brief, either, fault_of
+from sweep.faults import InputError, brief, either, fault_of
 from sweep.grid import CASE, SAMPLE
 from sweep.models import TIERS
 from sweep.models.origin import Origin
@@ -36,7 +36,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
 
     Raises
     ------
-    ConfigError
+    InputError
         if the code cannot be read, does not define a model, or must not run.
     """
     name = source.values.get("model")
@@ -47,7 +47,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         return None  # the schema refuses it later
     if announce is None:
         message = "refusing to run user code named inside a dataset"
-        raise ConfigError([source.fault(("model",), f"{brief(name)}: {message}; choose {either(TIERS)}")])
+        raise InputError([source.fault(("model",), f"{brief(name)}: {message}; choose {either(TIERS)}")])
     if origin is None:
         path, text = source.read_beside("model", name)
         origin = Origin.of_file(name, str(path), text)
@@ -55,7 +55,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     pinned = source.values.get("model_sha256")
     if pinned is not None and pinned != origin.digest:
         message = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
-        raise ConfigError([source.fault(("model_sha256",), message)])
+        raise InputError([source.fault(("model_sha256",), message)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     for p in loading.load(origin).own_parameters:
         if wrong := [word for word in (p.name, p.section) if word in TAKEN]:
@@ -65,7 +65,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
 
 
 def try_out(config: Config) -> None:
-    """Call the functions of a user's model for the first and the last cell; raise a `ConfigError` if they do not
+    """Call the functions of a user's model for the first and the last cell; raise a `InputError` if they do not
     work."""
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}

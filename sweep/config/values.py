@@ -105,7 +105,7 @@ def _parse(parameter: Parameter, raw: Any) -> Values:
 
 
 def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], str]) -> tuple[float, ...]:
-    """Return the numbers that `raw`, a number or an axis, gives to a parameter; a `ConfigError` names the parameter.
+    """Return the numbers that `raw`, a number or an axis, gives to a parameter; a `InputError` names the parameter.
 
     `unitless`, such as `Config.unitless`, says why the parameter cannot have a unit.
     """

@@ -19,12 +19,12 @@ import numba
 from sweep.config import Config
 from sweep.engine.local import Done, run_batch, split
 from sweep.engine.plan import kernels
+from sweep.faults import FileError
 from sweep.grid import Tile
 from sweep.interrupt import point
 from sweep.kernels.build import APPROACH, build
 from sweep.kernels.layout import LANES
 from sweep.results.provenance import Identity, identify, sources
-from sweep.results.store import StoreError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -46,7 +46,7 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
 
     Raises
     ------
-    StoreError
+    FileError
         if a worker runs other source code, a tile kills several workers, or the scheduler disappears.
     """
     from distributed import CancelledError, KilledWorker, as_completed
@@ -61,9 +61,9 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
             done: list[Done] = future.result()
         except KilledWorker as error:
             deaths = error.allowed_failures + 1
-            raise StoreError(f"tile {numbers[future][0]}: {deaths} workers died computing it; out of memory?") from None
+            raise FileError(f"tile {numbers[future][0]}: {deaths} workers died computing it; out of memory?") from None
         except CancelledError:
-            raise StoreError(_LOST) from None
+            raise FileError(_LOST) from None
         del numbers[future]
         future.release()
         yield from done
@@ -107,7 +107,7 @@ def _work(shared: Shared, batch: Sequence[int]) -> list[Done]:
     config, tiles, identity = shared
     source_hash, versions = sources()
     if reason := identity.difference(replace(identity, source_hash=source_hash, versions=versions)):
-        raise StoreError(f"{get_worker().address}: the worker has {reason}")
+        raise FileError(f"{get_worker().address}: the worker has {reason}")
     with _one_tile:
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
         numba.set_num_threads(min(get_worker().state.nthreads, most))
@@ -120,7 +120,7 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
 
     Raises
     ------
-    StoreError
+    FileError
         if no scheduler answers, or distributed is not installed.
     """
     if not isinstance(client, str):
@@ -130,7 +130,7 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
         import distributed
     except ModuleNotFoundError:
         message = "needs distributed, which is not installed: pip install 'dask[distributed]'"
-        raise StoreError(f"{client}: {message}") from None
+        raise FileError(f"{client}: {message}") from None
 
     for logger in ("distributed", "distributed.client"):  # user-visible problems are raised as errors
         logging.getLogger(logger).setLevel("CRITICAL")
@@ -139,6 +139,6 @@ def connected(client: Client | str | None) -> Iterator[Client | None]:
         distributed.comm.resolve_address(client)
         there = distributed.Client(client, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
-        raise StoreError(f"{client}: no dask scheduler answers ({error})") from None
+        raise FileError(f"{client}: no dask scheduler answers ({error})") from None
     with there:
         yield there

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from sweep.config import Config, ConfigError, ConfigLike, load_config
+from sweep.config import Config, ConfigLike, InputError, load_config
 from sweep.engine import local
 from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
 from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
-from sweep.faults import fault_of
+from sweep.faults import FileError, fault_of
 from sweep.grid import Tile
 from sweep.interrupt import deferred, point
 from sweep.models.user.blame import blamed
@@ -33,7 +33,7 @@ from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import Identity, identify, not_resumed
-from sweep.results.store import Running, Store, StoreError
+from sweep.results.store import Running, Store
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -58,11 +58,11 @@ def run(
     if rerun not in (None, *RERUN):
         raise fault_of(f"must be {' or '.join(RERUN)}, not {rerun!r}", "rerun")
     if rerun and fresh:
-        raise StoreError("--rerun: it needs the dataset that --fresh discards; leave out one of the two")
+        raise FileError("--rerun: it needs the dataset that --fresh discards; leave out one of the two")
     if rerun and output is None:
-        raise StoreError("rerun: it needs output, the folder of the run whose cells are to be simulated again")
+        raise FileError("rerun: it needs output, the folder of the run whose cells are to be simulated again")
     if rerun and config.refine:
-        raise StoreError("--rerun: single cells of a refined run cannot be simulated again; start anew with --fresh")
+        raise FileError("--rerun: single cells of a refined run cannot be simulated again; start anew with --fresh")
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)
@@ -97,7 +97,7 @@ def run(
 def _forget_pictures(config: Config, files: RunFiles) -> None:
     """Remove the pictures of an existing or former dataset: they would be taken for those of the next one."""
     named = files.pictures(config.picture)
-    with suppress(StoreError), open_dataset(files.dataset, load=False) as there:
+    with suppress(FileError), open_dataset(files.dataset, load=False) as there:
         named |= files.pictures(quantities.pictured(there))
     for path in named:
         path.unlink(missing_ok=True)
@@ -112,7 +112,7 @@ def _earlier(
 
     Raises
     ------
-    StoreError
+    FileError
         if results of that dataset would be lost.
     """
     if found:
@@ -123,7 +123,7 @@ def _earlier(
     elif files.earlier.exists():
         there = files.opened(files.earlier)
     elif rerun:
-        raise StoreError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
+        raise FileError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
     else:
         return None
     return taken_over(config, there, rerun)
@@ -185,5 +185,5 @@ def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporte
         if others or not path.exists():
             try:
                 picture.plot(result, variable, output=path)
-            except ConfigError as error:
+            except InputError as error:
                 reporter.note(f"no picture{f' of {variable}' if variable else ''}: {error}")

@@ -13,7 +13,7 @@ from typing import Any
 
 import xarray as xr
 
-from sweep.config import ConfigError, Values
+from sweep.config import InputError, Values
 from sweep.config.schema import FOREVER
 from sweep.engine.plan import steps_of
 from sweep.engine.reporter import Progress, Reporter
@@ -167,7 +167,7 @@ class Runner:
             job.over = job.curve.whole
         except Dropped:
             return
-        except ConfigError as error:
+        except InputError as error:
             job.fault = error.faults[0].message if error.faults else str(error)
         except Exception as error:  # shown on the page, because this thread has to continue
             job.fault = printable(f"{type(error).__name__}: {error}")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from sweep.config import ConfigError, Fault
+from sweep.config import Fault, InputError
 from sweep.config.user_models import SUFFIX
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
@@ -27,7 +27,7 @@ class Setup:
 
     Raises
     ------
-    ConfigError
+    InputError
         if the dataset has no configuration, or one that cannot be run, or `model` is not the dataset's.
     """
 
@@ -36,7 +36,7 @@ class Setup:
         # it.
         config = configuration(source.dataset, *((_named(source, model), announce) if model else ()))
         if not config.simulated:
-            raise ConfigError([])
+            raise InputError([])
         medians = config.at_medians
         there = [name for name in config.tier.parameters if name in medians.parameters]
         self.config = replace(medians, parameters={name: medians.parameters[name] for name in there})
@@ -55,7 +55,7 @@ def usable(source: Source) -> Setup | None:
     """The setup of the dataset; None if it has no configuration for trajectories."""
     try:
         return Setup(source)
-    except ConfigError:
+    except InputError:
         return None
 
 
@@ -72,5 +72,5 @@ def _named(source: Source, model: str) -> dict[str, str]:
     elif entry_point(model) is None:
         words = f"{brief(model)} is neither a Python file nor an entry point of an installed package"
     if words:
-        raise ConfigError([Fault("", None, None, ("--model",), words)])
+        raise InputError([Fault("", None, None, ("--model",), words)])
     return {"model": model, "model_sha256": str(wanted)}

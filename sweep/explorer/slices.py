@@ -13,12 +13,12 @@ import numpy as np
 import xarray as xr
 
 from sweep.axis import Axis
+from sweep.faults import FileError
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe
 from sweep.results.kind import kind, opened
 from sweep.results.netcdf import open_dataset
-from sweep.results.store import StoreError
 
 IN_MEMORY = 2_000_000
 """Largest number of cells of a dataset that is read as a whole; slices of a larger one are read when they are shown."""
@@ -50,7 +50,7 @@ class Source:
 
     Raises
     ------
-    StoreError
+    FileError
         if the file is not a dataset with an axis.
     """
 
@@ -60,9 +60,9 @@ class Source:
         of_kind = kind(dataset)
         what = "no axis" if not dims else of_kind.words if of_kind and not of_kind.explored else ""
         if what:
-            raise StoreError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
+            raise FileError(f"{name} has {what}; open a dataset of run or critical that has an axis or more")
         if taken := ADDRESS.intersection(dims):
-            raise StoreError(f"{name}: the axis {min(taken)} has the name of a key of the explorer's address")
+            raise FileError(f"{name}: the axis {min(taken)} has the name of a key of the explorer's address")
         self.name = name
         self.dims = dims
         ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in dims if d in dataset.coords}

@@ -76,7 +76,7 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
 
     Raises
     ------
-    ConfigError
+    InputError
         if a user's model cannot be compiled.
     """
     kernels = list(kernels)
@@ -107,7 +107,7 @@ def compile_seconds(jobs: Sequence[Job]) -> float:
 
 
 def try_compiling(model: Model) -> None:
-    """Compile the inline functions of a model one by one, so that a `ConfigError` gives the line of a fault."""
+    """Compile the inline functions of a model one by one, so that a `InputError` gives the line of a fault."""
     numba, states = load_numba(), (0.0,) * len(model.states)
     constants = model.constants(*(0.0 for _ in model.constants._fields))
     with blamed(model.origin):

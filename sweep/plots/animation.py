@@ -96,13 +96,13 @@ def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
 
 
 def require_attitude(config: Config) -> None:
-    """Raise a `ConfigError` if the bodies of a simulated model have no attitude that could be shown."""
+    """Raise a `InputError` if the bodies of a simulated model have no attitude that could be shown."""
     if config.simulated and not config.equations.path:
         raise config.error(("model",), f"the bodies of {config.model} have no attitude; animate slip or noslip")
 
 
 def check(path: Path) -> None:
-    """Raise a `ConfigError` if no animation can be written to a file of this name."""
+    """Raise a `InputError` if no animation can be written to a file of this name."""
     if suffix(path) not in FORMATS:
         raise fault_of(f"{path}: unknown format; write a gif, mp4 or html", "output")
     if suffix(path) == "mp4" and not FFMpegWriter.isAvailable():

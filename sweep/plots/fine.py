@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.axis import Axis
-from sweep.config import Config, ConfigError
+from sweep.config import Config, InputError
 from sweep.grid import Grid
 from sweep.parameters import START
 from sweep.prediction import predict
@@ -53,7 +53,7 @@ def _between(axis: Axis, number: int, config: Config, *, whole: bool) -> Iterato
 def _config(text: str) -> Config | None:
     try:
         return configuration(xr.Dataset(attrs={"config": text}))
-    except ConfigError:
+    except InputError:
         return None
 
 

@@ -71,7 +71,7 @@ def choose(
 
     Raises
     ------
-    ConfigError
+    InputError
         if there is no such variable or axis, or there would be too many panels.
     """
     dataset = dataset.isel(nearest(dataset, sel or {}))
@@ -110,7 +110,7 @@ def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
 
     Raises
     ------
-    ConfigError
+    InputError
         if there is no such axis, or no such value on it.
     """
     found = {}
@@ -134,7 +134,7 @@ def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
 
 
 def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
-    """Raise a `ConfigError` if a variable cannot be drawn over these dimensions."""
+    """Raise a `InputError` if a variable cannot be drawn over these dimensions."""
     if name == "probability" and "count" not in dataset.coords:
         raise fault_of("the probabilities have lost their axis count; reduce the dataset along other axes", "variable")
     if odd := odd_axis(dataset, dims):

@@ -101,10 +101,10 @@ def plot(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the dataset has no such variable or axis, would need too many panels, or there is no such format or width; if
         the size is too small.  With `ax`, if there are several panels.
-    StoreError
+    FileError
         if the file is not a dataset, if the dataset has lost what its figure needs, or `output` cannot be written.
 
     Examples
@@ -185,7 +185,7 @@ def _of_size(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the size is too small; the message gives one that suffices.
     """
 
@@ -234,7 +234,7 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
 
 
 def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | None) -> None:
-    """Raise a `ConfigError` for limits or a colour map that the chosen panels have no scale for."""
+    """Raise a `InputError` for limits or a colour map that the chosen panels have no scale for."""
     name = chosen.names[0]
     if limits is not None and labels.flag_words(chosen.dataset, name):
         raise fault_of(f"{name} is drawn as categories, which have no scale; leave them out", "limits")
@@ -254,7 +254,7 @@ def _pair(given: Any, option: str, wanted: str, fits: Callable[[float, float], b
 
 
 def inches(width: str) -> float:
-    """Return a length such as "85mm" in inches; `ConfigError` if it is not a length that a figure can have."""
+    """Return a length such as "85mm" in inches; `InputError` if it is not a length that a figure can have."""
     length, error = quantity(str(width), LENGTH) or (0.0, 0.0)
     if error or not _NARROWEST <= length <= _WIDEST:
         span = f"between {_NARROWEST * 1e3:g} and {_WIDEST * 1e3:g} mm"

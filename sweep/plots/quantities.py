@@ -69,7 +69,7 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
     Raises
     ------
-    ConfigError
+    InputError
         if the dataset has no such variable, nor those from which it is derived.
     """
     if name in (possible := derivable(dataset)):
@@ -93,7 +93,7 @@ def pictured(dataset: xr.Dataset) -> list[str]:
 
 
 def check_pictures(config: Config) -> None:
-    """Raise a `ConfigError` if a configuration names a picture of a variable that its run does not have."""
+    """Raise a `InputError` if a configuration names a picture of a variable that its run does not have."""
     comes_with = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
     if config.tier.counts in Foreseen.variables:  # the reversals of this tier are foreseen
         comes_with |= dict.fromkeys(Foreseen.variables, Reversals.name)

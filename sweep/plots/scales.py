@@ -57,7 +57,7 @@ class Scale:
 
 
 def colour_map(name: str) -> Colormap:
-    """Look up a colour map of matplotlib; `ConfigError` if the name is unknown."""
+    """Look up a colour map of matplotlib; `InputError` if the name is unknown."""
     if not isinstance(name, str) or name not in mpl.colormaps:
         raise fault_of(
             f"there is no colour map {brief(str(name))}; choose one of matplotlib's, such as viridis or cividis", "cmap"
@@ -102,7 +102,7 @@ def ratios(values: Array, limits: Limits | None = None, name: str | None = None)
 
     Raises
     ------
-    ConfigError
+    InputError
         if a limit is not positive.
     """
     if limits and not limits[0] > 0:

@@ -61,7 +61,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
 
     Raises
     ------
-    ConfigError
+    InputError
         if there is no such series.
     """
     series = [str(name) for name, v in dataset.data_vars.items() if "time" in v.dims]

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter
 
+from sweep.faults import FileError
 from sweep.grid import Array
 from sweep.results.provenance import Identity, require_same
-from sweep.results.store import Running, Store, StoreError
+from sweep.results.store import Running, Store
 from sweep.results.writing import replacing
 
 _IDENTITY = TypeAdapter(Identity)
@@ -33,7 +34,7 @@ class Checkpoint(Store):
 
         Raises
         ------
-        StoreError
+        FileError
             if `folder` belongs to another run.
         """
         self.folder, self.note, self.identity = folder, note, identity
@@ -42,7 +43,7 @@ class Checkpoint(Store):
             try:
                 found = _IDENTITY.validate_json(head.read_bytes())
             except (OSError, ValueError):
-                raise StoreError(f"{head}: damaged; start again with --fresh") from None
+                raise FileError(f"{head}: damaged; start again with --fresh") from None
             require_same(folder, found, identity)
         else:
             folder.mkdir(exist_ok=True)
@@ -61,7 +62,7 @@ class Checkpoint(Store):
         path = self.folder / f"{tile:06d}.npz"
         arrays = self._read(path)
         if arrays is None:
-            raise StoreError(f"{path}: damaged during the run; the same command computes it again")
+            raise FileError(f"{path}: damaged during the run; the same command computes it again")
         return arrays
 
     def save_running(self, running: Running) -> None:

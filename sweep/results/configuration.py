@@ -30,7 +30,7 @@ def configuration(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the configuration cannot be run.
     """
     values = parse_value(str(dataset.attrs.get("config", "")), "config")

@@ -170,7 +170,7 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
-    """Raise a `ConfigError` if a parameter has the name of a variable, or of one of these `series`."""
+    """Raise a `InputError` if a parameter has the name of a variable, or of one of these `series`."""
     own = {*VARIABLES, *PROBABILITIES, *ROWS, *series}
     names = own & set(config.tier.parameters)
     if names:

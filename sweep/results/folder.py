@@ -11,9 +11,9 @@ from pathlib import Path
 
 import xarray as xr
 
+from sweep.faults import FileError
 from sweep.results import netcdf
 from sweep.results.provenance import Identity
-from sweep.results.store import StoreError
 from sweep.results.writing import remove_unfinished, replacing, require_writable
 
 
@@ -34,7 +34,7 @@ class RunFiles:
         return {self.picture: variables[0] if variables else None, **further}
 
     def require_writable(self) -> None:
-        """Raise a `StoreError` if dataset or picture cannot be written."""
+        """Raise a `FileError` if dataset or picture cannot be written."""
         netcdf.require_name(self.dataset)
         for path in (self.dataset, self.picture):
             require_writable(path)
@@ -47,7 +47,7 @@ class RunFiles:
 
         Raises
         ------
-        StoreError
+        FileError
             if another run is using the folder, or nothing can be written.
         """
         self.require_writable()
@@ -57,13 +57,13 @@ class RunFiles:
             try:
                 handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             except OSError as error:
-                raise StoreError(f"{self.dataset}: cannot be locked: {error.strerror}") from None
+                raise FileError(f"{self.dataset}: cannot be locked: {error.strerror}") from None
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 os.close(handle)
                 words = "in use by another run; wait for it, or choose another --output"
-                raise StoreError(f"{self.folder / self.name}: {words}") from None
+                raise FileError(f"{self.folder / self.name}: {words}") from None
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), path.stat()):
                     break
@@ -81,7 +81,7 @@ class RunFiles:
 
         Raises
         ------
-        StoreError
+        FileError
             if the file is not a dataset.
         """
         if not self.dataset.exists():
@@ -93,8 +93,8 @@ class RunFiles:
         """Open the dataset at `path`, one of these files; raises as `open_dataset`, with advice on how to go on."""
         try:
             return netcdf.open_dataset(path, load=load)
-        except StoreError as error:
-            raise StoreError(f"{error}; discard it with --fresh, or choose another --output") from None
+        except FileError as error:
+            raise FileError(f"{error}; discard it with --fresh, or choose another --output") from None
 
     def keep_earlier(self) -> None:
         """Keep the existing dataset while the run that enlarges it goes on."""

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import xarray as xr
 
-from sweep.faults import counted
+from sweep.faults import FileError, counted
 from sweep.parameters import PARAMETERS
 from sweep.results.dataset import SIDES, VARIABLES
 from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
 from sweep.results.probabilities import PROBABILITIES
-from sweep.results.store import StoreError
 
 ATTRIBUTE = "sweep_kind"
 """The attribute of a dataset that names its kind."""
@@ -110,19 +109,19 @@ def kind(dataset: xr.Dataset) -> Kind | None:
 
 
 def opened(path: Path, *, load: bool = True) -> xr.Dataset:
-    """Open a dataset as `open_dataset`; raise a `StoreError` also if its kind is unknown or it is incomplete."""
+    """Open a dataset as `open_dataset`; raise a `FileError` also if its kind is unknown or it is incomplete."""
     dataset = open_dataset(path, load=load)
     try:
         return require_whole(dataset, str(path))
-    except StoreError:
+    except FileError:
         dataset.close()
         raise
 
 
 def require_whole(dataset: xr.Dataset, name: str = "the dataset") -> xr.Dataset:
-    """Return a dataset if its kind is known and complete; raise a `StoreError` otherwise."""
+    """Return a dataset if its kind is known and complete; raise a `FileError` otherwise."""
     if found := fault(dataset):
-        raise StoreError(f"{name}: {found}")
+        raise FileError(f"{name}: {found}")
     return dataset
 
 

@@ -16,9 +16,9 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
+from sweep.faults import FileError
 from sweep.grid import Array
 from sweep.interrupt import deferred
-from sweep.results.store import StoreError
 from sweep.results.writing import probe, replacing
 
 
@@ -49,7 +49,7 @@ def write(
                     file[name][place] = values
         except RuntimeError as error:  # netCDF's own error hides the system's
             probe(temporary)
-            raise StoreError(f"{path}: cannot be written: {error}") from None
+            raise FileError(f"{path}: cannot be written: {error}") from None
 
 
 def _write_frame(frame: xr.Dataset, path: Path) -> None:
@@ -62,17 +62,17 @@ def _write_frame(frame: xr.Dataset, path: Path) -> None:
 
 
 def require_name(path: Path) -> None:
-    """Raise a `StoreError` if netCDF cannot open files at this path."""
+    """Raise a `FileError` if netCDF cannot open files at this path."""
     try:
         os.path.abspath(path).encode()
     except UnicodeEncodeError:
-        raise StoreError(f"{path}: its full path is not UTF-8, as netCDF needs it; rename the folder") from None
+        raise FileError(f"{path}: its full path is not UTF-8, as netCDF needs it; rename the folder") from None
 
 
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
-    """Read a dataset into memory, or on demand with `load=False`; raise a `StoreError` if it is not one."""
+    """Read a dataset into memory, or on demand with `load=False`; raise a `FileError` if it is not one."""
     if not path.is_file():
-        raise StoreError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+        raise FileError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     require_name(path)
     try:
         if load:
@@ -82,11 +82,11 @@ def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
             with dataset:
                 dataset.load()
         return dataset
-    except StoreError:
+    except FileError:
         raise
     except Exception as error:  # the errors that HDF5, netCDF and xarray raise for damaged files are undocumented
         reason = getattr(error, "strerror", None) or error
-        raise StoreError(f"{path}: not a netCDF dataset, or damaged: {reason}") from None
+        raise FileError(f"{path}: not a netCDF dataset, or damaged: {reason}") from None
 
 
 def _refuse_larger_than_memory(path: Path) -> None:
@@ -95,4 +95,4 @@ def _refuse_larger_than_memory(path: Path) -> None:
         size = sum(variable.size * np.dtype(variable.dtype).itemsize for variable in file.variables.values())
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if size > memory:
-        raise StoreError(f"{path}: {size / 2**30:.3g} GiB of data are more than the memory, {memory / 2**30:.3g} GiB")
+        raise FileError(f"{path}: {size / 2**30:.3g} GiB of data are more than the memory, {memory / 2**30:.3g} GiB")

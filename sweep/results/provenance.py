@@ -20,11 +20,10 @@ import llvmlite.binding
 import numba
 
 from sweep.config import Config
-from sweep.faults import either, printable
+from sweep.faults import FileError, either, printable
 from sweep.jit import vector_bits
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.results import kind
-from sweep.results.store import StoreError
 from sweep.sources import hashed, versions
 
 _PACKAGE = Path(__file__).parent.parent
@@ -76,14 +75,14 @@ class Identity:
 
 
 def require_same(path: Path, found: Identity, wanted: Identity) -> None:
-    """Raise a `StoreError` if the file at `path`, with the identity `found`, does not belong to the run `wanted`."""
+    """Raise a `FileError` if the file at `path`, with the identity `found`, does not belong to the run `wanted`."""
     if reason := found.difference(wanted):
         raise not_resumed(path, reason)
 
 
-def not_resumed(path: Path, reason: str) -> StoreError:
+def not_resumed(path: Path, reason: str) -> FileError:
     """Return the error for a file that cannot be resumed, because it comes from `reason`."""
-    return StoreError(
+    return FileError(
         f"{path}: not resumed, it comes from {reason}\n"
         "  continue it with the same configuration or a larger one, choose another --output, or discard it with --fresh"
     )

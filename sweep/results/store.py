@@ -12,12 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from sweep.faults import Refused
 from sweep.grid import Array
-
-
-class StoreError(Refused):
-    """A file of the run cannot be used; the message says which one, why, and what to do."""
 
 
 class Running(NamedTuple):
@@ -47,7 +42,7 @@ class Store:
         self._tiles[tile] = dict(arrays)
 
     def load(self, tile: int) -> dict[str, Array]:
-        """Return the results of a tile that is `done`, bit for bit; raise a `StoreError` if they are lost."""
+        """Return the results of a tile that is `done`, bit for bit; raise a `FileError` if they are lost."""
         return self._tiles[tile]
 
     def save_running(self, running: Running) -> None:

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from sweep.results.store import StoreError
+from sweep.faults import FileError
 
 _PROBE = 1 << 22
 """Buffer size in bytes, larger than any HDF5 write."""
@@ -22,18 +22,18 @@ _BLOCK = 1 << 12
 
 
 def require_writable(path: Path) -> None:
-    """Raise a `StoreError` before anything is computed if a file cannot be written.
+    """Raise a `FileError` before anything is computed if a file cannot be written.
 
     A missing folder may be created later; nothing is left on the disk.
     """
     if path.is_dir():
-        raise StoreError(f"{path}: cannot be written: a folder")
+        raise FileError(f"{path}: cannot be written: a folder")
     folder = next(each for each in path.absolute().parents if each.exists())
     try:
         with TemporaryFile(dir=folder) as stream:
             stream.write(bytes(_BLOCK))
     except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error.strerror}; choose another --output") from None
+        raise FileError(f"{path}: cannot be written: {error.strerror}; choose another --output") from None
 
 
 @contextmanager
@@ -42,11 +42,11 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    StoreError
+    FileError
         if the file cannot be written.
     """
     if path.is_dir() or not path.parent.is_dir():
-        raise StoreError(f"{path}: cannot be written: {'a folder' if path.is_dir() else f'no folder {path.parent}'}")
+        raise FileError(f"{path}: cannot be written: {'a folder' if path.is_dir() else f'no folder {path.parent}'}")
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield temporary
@@ -54,7 +54,7 @@ def replacing(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
         _flush(path.parent)
     except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from None
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
     finally:
         with suppress(OSError):  # a read-only disk raises this even for a file that does not exist
             temporary.unlink()

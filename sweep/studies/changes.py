@@ -85,7 +85,7 @@ def changes(config: Config, reversals: int, reporter: Reporter) -> xr.Dataset:
 
 
 def _cell(config: Config) -> dict[str, float]:
-    """Return the parameters of the only cell of a configuration; raise a `ConfigError` if there are more."""
+    """Return the parameters of the only cell of a configuration; raise a `InputError` if there are more."""
     if ENDING not in config.tier.offers:
         raise config.error(("model",), "has no foreseen counts; choose the model slip with viscous friction")
     require_certain(config)

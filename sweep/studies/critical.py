@@ -48,7 +48,7 @@ def critical(config: Config, width: float) -> Task:
 
 
 def searchable(config: Config) -> Config:
-    """Return `config` with a single start spin, which has no influence; raise a `ConfigError` if it is unsuitable."""
+    """Return `config` with a single start spin, which has no influence; raise a `InputError` if it is unsuitable."""
     require_certain(config)
     if not config.of_rattlebacks:
         raise config.error(("model",), "not a rattleback; choose the model slip or noslip")

@@ -23,9 +23,9 @@ def shown(source: xr.Dataset | str | Path, reporter: Reporter | None = None) -> 
 
     Raises
     ------
-    StoreError
+    FileError
         if the file is not a dataset.
-    ConfigError
+    InputError
         if the fit cannot be followed, or used a user-defined model.
     """
     found = source if isinstance(source, xr.Dataset) else opened(Path(source))

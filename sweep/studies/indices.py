@@ -47,7 +47,7 @@ def indices(config: Config) -> Task:
 
 
 def designed(config: Config) -> Config:
-    """Return `config` with the samples of the design, n (parameters + 2) of them; raise a `ConfigError` if it has none.
+    """Return `config` with the samples of the design, n (parameters + 2) of them; raise a `InputError` if it has none.
 
     The first n samples and the next n are independent; then the first n are repeated for each parameter, with that
     parameter taken from the second n. n is the number of samples in the configuration, rounded up to a power of two.

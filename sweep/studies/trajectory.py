@@ -136,7 +136,7 @@ def trajectory(
 
     Raises
     ------
-    ConfigError
+    InputError
         if the model is not simulated, `at` selects cells that cannot be run, or the samples do not fit into memory.
     """
     if every is not None and not (is_number(each := plain_data(every)) and 0 < each < inf):
@@ -156,7 +156,7 @@ def trajectory(
 def first_values(config: Config, at: Mapping[str, Any]) -> str:
     """Name the axes of `config` that take their first value because `at` does not give one; "" if there are none.
 
-    Raises a `ConfigError` first if the cells cannot be run.
+    Raises a `InputError` first if the cells cannot be run.
     """
     choose(config, at)
     config = config.at_medians
@@ -222,7 +222,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
 
 
 def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> Config:
-    """Return `config` with the cells selected by `at` as cases, and dopri5; raise a `ConfigError` if they cannot run.
+    """Return `config` with the cells selected by `at` as cases, and dopri5; raise a `InputError` if they cannot run.
 
     Uncertain parameters that `at` does not name take their median, or else each of the `samples`.
     """
@@ -249,7 +249,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
 
 
 def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, Array]:
-    """Return the values requested for each parameter; raise a `ConfigError` for the first that cannot be run."""
+    """Return the values requested for each parameter; raise a `InputError` for the first that cannot be run."""
     model = config.tier
     if unknown := next((name for name in at if name not in model.parameters), ""):
         message = f"is not a parameter of the {model.name} model{suggestion(unknown, model.parameters)}"

@@ -129,7 +129,7 @@ def test_a_file_that_cannot_be_written_is_named_and_not_its_temporary_one(
 ) -> None:
     error = OSError(errno.EROFS, "Read-only file system", "hidden")
     monkeypatch.setattr(Path, "unlink", Mock(side_effect=error))
-    with pytest.raises(sweep.StoreError) as refusal, replacing(tmp_path / "x.png"):
+    with pytest.raises(sweep.FileError) as refusal, replacing(tmp_path / "x.png"):
         raise error
     assert str(refusal.value) == f"{tmp_path / 'x.png'}: cannot be written: Read-only file system"
 
@@ -178,5 +178,5 @@ def test_a_changed_dataset_says_what_it_lacks_or_what_is_foreign(
 
 def test_a_cluster_without_distributed_says_what_to_install(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(sweep.StoreError, match=r"tcp://here:1: needs distributed, which is not installed: pip install"):
+    with pytest.raises(sweep.FileError, match=r"tcp://here:1: needs distributed, which is not installed: pip install"):
         sweep.run(write(TEXT), client="tcp://here:1")

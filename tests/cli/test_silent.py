@@ -10,7 +10,7 @@ from support import Write
 from support.cli import invoke
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
 
 GRID = {"name": "quick", "friction": {"mu": [40.0, 60.0, 80.0, 100.0, 120.0]}, "start": {"n0": [0.02, 0.05]}}
 TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05]}\nintegrator: {t_end: 40}\n"
@@ -59,7 +59,7 @@ def test_the_picture_of_the_run_is_not_overwritten(options: str, name: str, file
 
 @pytest.mark.parametrize("value", [slice(0, 1), "a", [0.02, 0.05], np.nan, True])
 def test_a_selection_is_a_number(value: Any) -> None:
-    with pytest.raises(ConfigError, match=r"^sel: n0 = .*; give a finite number"):
+    with pytest.raises(InputError, match=r"^sel: n0 = .*; give a finite number"):
         sweep.plot(sweep.predict(GRID), sel={"n0": value})
 
 
@@ -71,7 +71,7 @@ def test_a_selection_is_any_number_near_a_value() -> None:
 
 @pytest.mark.parametrize("every", [0, -1, np.nan, np.inf, "1", True])
 def test_the_time_between_samples_is_a_positive_number(every: Any) -> None:
-    with pytest.raises(ConfigError, match=r"^every: must be a finite number > 0, not"):
+    with pytest.raises(InputError, match=r"^every: must be a finite number > 0, not"):
         sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20, every=every)
 
 
@@ -92,7 +92,7 @@ def test_a_trajectory_says_which_values_it_takes(write: Write, tmp_path: Path) -
 @pytest.mark.parametrize("name", ["bracket", "deviation"])
 @pytest.mark.parametrize("value", [0, -1, 2, np.nan])
 def test_a_width_that_no_search_reaches_is_refused(name: str, value: float) -> None:
-    with pytest.raises(ConfigError, match=f"^{name}: must be between .* and .*, not "):
+    with pytest.raises(InputError, match=f"^{name}: must be between .* and .*, not "):
         sweep.boundaries(GRID, **{name: value})  # type: ignore[arg-type]
 
 

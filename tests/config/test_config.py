@@ -13,7 +13,7 @@ from support import SMALL, Write
 from support.physics import STONE, stone
 
 import sweep
-from sweep import Config, ConfigError, load_config
+from sweep import Config, InputError, load_config
 from sweep.config.values import Range
 
 
@@ -50,7 +50,7 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
 
 
 def test_a_dataset_is_refused_as_a_configuration(small: xr.Dataset) -> None:
-    with pytest.raises(ConfigError, match=r"^this is a dataset, not a configuration"):
+    with pytest.raises(InputError, match=r"^this is a dataset, not a configuration"):
         sweep.trajectory(small, mu=40)
 
 
@@ -76,7 +76,7 @@ def test_cases_given_by_columns(table: Callable[..., Any]) -> None:
     ],
 )
 def test_wrong_columns_of_cases_are_refused(columns: dict[str, Any], said: str) -> None:
-    with pytest.raises(ConfigError) as refusal:
+    with pytest.raises(InputError) as refusal:
         load_config({"cases": columns})
     assert said in str(refusal.value)
     assert len(refusal.value.faults) == 1

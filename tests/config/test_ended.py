@@ -33,7 +33,7 @@ def test_what_has_ended_says_what_to_do_instead(name: str, write: Write, tmp_pat
         lambda: sweep.load_config(write(TEXT), {name: 1}),
         lambda: sweep.fit(write(TEXT), tmp_path / "film.csv", [name]),
     ):
-        with pytest.raises(sweep.ConfigError, match=f"^{name}: {words}$"):
+        with pytest.raises(sweep.InputError, match=f"^{name}: {words}$"):
             call()
 
 

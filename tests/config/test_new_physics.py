@@ -19,7 +19,7 @@ SURFACES["dish"] = replace(
 LAWS["coulomb-round"] = replace(LAWS["coulomb-cubic"], name="coulomb-round")
 LAWS["smear"] = replace(LAWS["coulomb-tanh"], name="smear", parameters=("mu", "speed", "mu_viscous"))
 
-from sweep import ConfigError, load_config
+from sweep import InputError, load_config
 from sweep.config.schema import PATHS, SETTINGS
 from sweep.grid import Grid
 
@@ -48,11 +48,11 @@ for law, twin in (
 assert "smear" in SETTINGS["friction.law"].annotation.__args__
 assert made.described("a")["long_name"] == "hollow"
 assert "units" not in made.described("mu")
-with pytest.raises(ConfigError, match="start point off the dish at x0=4"):
+with pytest.raises(InputError, match="start point off the dish at x0=4"):
     config("dish", {"law": "smear"}, x0=4)
-with pytest.raises(ConfigError, match="must be ellipsoid, paraboloid or dish, not 'plate'"):
+with pytest.raises(InputError, match="must be ellipsoid, paraboloid or dish, not 'plate'"):
     config("plate", {"law": "smear"})
-with pytest.raises(ConfigError, match="body.b: missing"):
+with pytest.raises(InputError, match="body.b: missing"):
     load_config({"body": {"surface": "dish", **INERTIA}, "friction": {"mu": 1}})
 """
 

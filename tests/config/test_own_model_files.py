@@ -15,7 +15,7 @@ from support.cli import invoke, refused
 from support.own import FADING, PENDULUM
 
 import sweep
-from sweep.config import ConfigError, load_config
+from sweep.config import InputError, load_config
 from sweep.models.model import ENERGY, LINEAR
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user import loading
@@ -144,18 +144,18 @@ def test_what_only_opens_the_dataset_does_not_run_it(folder: Path, ran: Path) ->
     file = folder / "pendulum.nc"
     assert invoke("info", file).exit_code == 0
     assert invoke("plot", file, "--output", folder / "map.png").exit_code == 0
-    sweep.open(file)
+    sweep.open_dataset(file)
     sweep.plot(file)
     assert not ran.exists()
 
 
 def test_a_pinned_file_is_the_only_one_that_runs(folder: Path, ran: Path) -> None:
     digest = hashlib.sha256((folder / "pendulum.py").read_bytes()).hexdigest()
-    with pytest.raises(ConfigError, match=f"model_sha256: '{'0' * 64}', but pendulum.py has {digest}; pin that"):
+    with pytest.raises(InputError, match=f"model_sha256: '{'0' * 64}', but pendulum.py has {digest}; pin that"):
         load_config(folder / "pendulum.yaml", {"model_sha256": "0" * 64})
     assert not ran.exists()
     assert load_config(folder / "pendulum.yaml", {"model_sha256": digest}).origin.digest == digest
-    with pytest.raises(ConfigError, match="the slip model does not come from a file"):
+    with pytest.raises(InputError, match="the slip model does not come from a file"):
         load_config({"friction": {"mu": 60}, "model_sha256": digest})
 
 
@@ -172,7 +172,7 @@ def test_parameters_are_known_to_settings_messages_and_tables(folder: Path) -> N
         ("integrator.method", "adams", "cannot run the pendulum model; choose dopri5 or auto"),
         ("measure", ["energy_error"], "energy_error cannot be measured on the pendulum model; choose from reversals"),
     ):
-        with pytest.raises(ConfigError, match=message):
+        with pytest.raises(InputError, match=message):
             load_config(file, {key: value})
     (folder / "cells.csv").write_text("torque,damping\n0.5,0.2\n1.5,0.4\n", encoding="utf-8")
     cells = load_config({"model": str(folder / "pendulum.py"), "cases": str(folder / "cells.csv")})
@@ -197,7 +197,7 @@ def test_a_configuration_keeps_its_model_wherever_it_goes(folder: Path, monkeypa
     (folder / "moved.py").write_bytes((elsewhere / "moved.py").read_bytes())
     assert load_config(folder / "written.yaml").fingerprint() == first.fingerprint()
     (folder / "moved.py").write_text(PENDULUM + "\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match="model_sha256"):
+    with pytest.raises(InputError, match="model_sha256"):
         load_config(folder / "written.yaml")
 
 
@@ -210,7 +210,7 @@ def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
         ("offset", 0.03, r"centre of mass outside the ellipsoid"),
         ("body.surface", "cone", "body.surface: must be ellipsoid or paraboloid, not 'cone'"),
     ):
-        with pytest.raises(ConfigError, match=message):
+        with pytest.raises(InputError, match=message):
             load_config(file, {key: value})
 
 
@@ -279,7 +279,7 @@ def test_a_package_offers_models_by_entry_points(package: Path) -> None:
     first = load_config({"model": "swing", "drive": {"torque": 0.3}}, announce=said.append)
     assert first.equations.name == "pendulum"
     assert said[0].startswith("running the code of swings.one:MODEL")
-    with pytest.raises(ConfigError, match=r"entry point lost = swings.one:NOTHING: .*no attribute 'NOTHING'"):
+    with pytest.raises(InputError, match=r"entry point lost = swings.one:NOTHING: .*no attribute 'NOTHING'"):
         load_config({"model": "lost"})
     (package / "helper.py").write_text("x = 1\n", encoding="utf-8")
     assert load_config({"model": "swing", "drive": {"torque": 0.3}}).fingerprint() != first.fingerprint()
@@ -296,8 +296,8 @@ RESERVED = {
 @pytest.mark.parametrize("name", RESERVED)
 def test_no_parameter_takes_a_name_that_means_something_else(folder: Path, name: str) -> None:
     (folder / "pendulum.py").write_text(PENDULUM.replace('"torque"', f'"{name}"'), encoding="utf-8")
-    with pytest.raises(ConfigError, match=RESERVED[name]):
+    with pytest.raises(InputError, match=RESERVED[name]):
         sweep.trajectory({"model": str(folder / "pendulum.py")})
     if name == "t_stop":
-        with pytest.raises(ConfigError, match=RESERVED[name]):
+        with pytest.raises(InputError, match=RESERVED[name]):
             sweep.run({"model": str(folder / "pendulum.py")})

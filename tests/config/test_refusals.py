@@ -8,7 +8,7 @@ from support import SMALL, Write
 from support.cli import invoke, refused
 from support.physics import MOMENTS, stone
 
-from sweep import ConfigError, load_config
+from sweep import InputError, load_config
 from sweep.faults import fault_of
 
 
@@ -165,7 +165,7 @@ def test_a_broken_configuration_is_refused_with_its_place(number: int, write: Wr
 
 def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None:
     text = "colour: red\nintegrator: {t_end: -1}\nstart: {n0: x}\nmeasure: [spin]\nfriction: {nu: 3}\nbody: {a: 0}\n"
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         load_config(write(text))
     assert [fault.line for fault in error.value.faults] == [1, 2, 3, 4, 5, 6]
     assert [int(line.split(":")[1]) for line in str(error.value).splitlines()] == [1, 2, 3, 4, 5, 6]
@@ -177,7 +177,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None
 def test_faults_of_settings_without_lines_are_told_in_the_order_of_the_laws() -> None:
     """Not in that of a set of strings, which changes from process to process."""
     foreign = ["speed", "mu_static", "speed_stick", "mu_viscous", "radius_contact"]
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         load_config({"model": "slip", "friction": {"mu": 5, **dict.fromkeys(foreign, 1)}})
     assert [line.split(":")[0] for line in str(error.value).splitlines()] == [f"friction.{name}" for name in foreign]
 

@@ -52,7 +52,7 @@ def test_the_command_line_takes_them_too(write: Write, tmp_path: Path) -> None:
     line = ["trajectory", write(STONE), "--set", "t_end=0.1", "--output", tmp_path, "--quiet"]
     assert invoke(*line, "--at", "c=2 cm", "--at", "c=25mm").exit_code == 0
     (file,) = tmp_path.glob("*_trajectory.nc")
-    assert sweep.open(file)["c"].values == pytest.approx([0.02, 0.025])
+    assert sweep.open_dataset(file)["c"].values == pytest.approx([0.02, 0.025])
 
 
 @pytest.mark.parametrize(

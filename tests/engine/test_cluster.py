@@ -24,8 +24,8 @@ from support.runs import Heard, same_numbers
 from support.same import contents
 
 import sweep
+from sweep.faults import FileError
 from sweep.results.provenance import sources
-from sweep.results.store import StoreError
 
 TEXT = """\
 name: tiles
@@ -167,7 +167,7 @@ def test_another_program_in_a_worker_is_refused(
     own[changed[0]] = changed[1]
     with (
         patched(client, "sweep.engine.cluster.sources", lambda: tuple(own)),
-        pytest.raises(StoreError, match=f"tcp://.*: the worker has {said}"),
+        pytest.raises(FileError, match=f"tcp://.*: the worker has {said}"),
     ):
         sweep.run(config, client=client)
 
@@ -177,7 +177,7 @@ def test_a_tile_that_kills_its_workers_is_reported(
 ) -> None:
     monkeypatch.setattr(local.scheduler, "allowed_failures", 0)
     with patched(client, "sweep.engine.cluster.run_batch", lambda *_: os._exit(1)):
-        with pytest.raises(StoreError, match="workers died computing it"):
+        with pytest.raises(FileError, match="workers died computing it"):
             sweep.run(config, client=client)
         client.wait_for_workers(2)
 

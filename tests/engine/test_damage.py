@@ -20,10 +20,10 @@ from support.same import contents
 
 import sweep
 from sweep.engine import executor, local
+from sweep.faults import FileError
 from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.provenance import Identity
-from sweep.results.store import StoreError
 from sweep.sources import versions
 
 TILE = 3
@@ -227,7 +227,7 @@ def test_every_flipped_bit_of_a_tile_is_seen(every: int, tmp_path: Path) -> None
         path.write_bytes(damaged)
         try:
             found = checkpoint.load(0)
-        except StoreError:
+        except FileError:
             continue
         missed += 1
         assert found.keys() == tile.keys()

@@ -15,7 +15,7 @@ from support.physics import TURNS, stone
 from support.runs import Heard, Stop, same_numbers
 
 import sweep
-from sweep import StoreError
+from sweep import FileError
 from sweep.engine.enlarged import taken_over
 from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
 
@@ -156,7 +156,7 @@ def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> Non
 def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str], said: str) -> None:
     grown(write, tmp_path / "out", ONE)
     before = (tmp_path / "out" / "small.nc").read_bytes()
-    with pytest.raises(StoreError, match="not resumed") as caught:
+    with pytest.raises(FileError, match="not resumed") as caught:
         grown(write, tmp_path / "out", ONE.replace(*change))
     assert said in str(caught.value)
     assert (tmp_path / "out" / "small.nc").read_bytes() == before
@@ -180,7 +180,7 @@ def test_nothing_is_taken_from_an_edited_dataset(how: str, write: Write, tmp_pat
     there, _ = grown(write, tmp_path / "out", text)
     EDITS[how](there).to_netcdf(tmp_path / "out" / "small.nc")
     for options in ({"n0": [0.02, 0.03, 0.05]}, {"rerun": "limit"}):
-        with pytest.raises(StoreError, match=r"edited since|another configuration"):
+        with pytest.raises(FileError, match=r"edited since|another configuration"):
             grown(write, tmp_path / "out", text, **options)
 
 
@@ -195,7 +195,7 @@ def test_a_part_of_a_dataset_is_no_complete_run(write: Write, tmp_path: Path) ->
 def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     grown(write, tmp_path / "out", ONE)
     monkeypatch.setattr("sweep.results.provenance.sources", lambda: ("other", "versions"))
-    with pytest.raises(StoreError, match="not resumed"):
+    with pytest.raises(FileError, match="not resumed"):
         grown(write, tmp_path / "out", MORE)
 
 
@@ -205,7 +205,7 @@ def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> Non
     changes = (("9.81", "1.62"), ("0.02, sigma", "0.03, sigma"), ("tanh", "sqrt"), (", sigma: 1.0e-4", ""),
                ("roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]", "n0: [-5, 5], x0: 1.0e-3, y0: 0"))  # fmt: skip
     for change in changes:
-        with pytest.raises(StoreError, match="not resumed"):
+        with pytest.raises(FileError, match="not resumed"):
             grown(write, tmp_path / "out", SCENE.replace(*change))
 
 
@@ -220,7 +220,7 @@ def test_rerun_computes_just_those_cells(write: Write, tmp_path: Path) -> None:
     for name in ("reversals", "spin_final", "t_stop", "step", "status"):
         xr.testing.assert_equal(found[name], xr.where(limit, expected[name], short[name]))
     # Settings differ from cell to cell now: no other run may add to these.
-    with pytest.raises(StoreError, match="some cells were repeated"):
+    with pytest.raises(FileError, match="some cells were repeated"):
         grown(write, tmp_path / "out", later.replace("[40, 50", "[30, 40, 50"))
 
 
@@ -243,16 +243,16 @@ def test_rerun_of_no_cells_leaves_a_dataset_that_can_grow(write: Write, tmp_path
 
 
 def test_rerun_needs_a_dataset_that_was_not_refined(write: Write, tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match=r"^rerun: it needs output, the folder of the run"):
+    with pytest.raises(FileError, match=r"^rerun: it needs output, the folder of the run"):
         sweep.run(write(ONE), rerun="failed")
-    with pytest.raises(StoreError, match=r"^--rerun: single cells of a refined run cannot .*; start anew with --fresh"):
+    with pytest.raises(FileError, match=r"^--rerun: single cells of a refined run cannot .*; start anew with --fresh"):
         grown(write, tmp_path / "out", ONE, rerun="failed", refine=1, tolerance=1e-9)
-    with pytest.raises(StoreError, match="--rerun needs the dataset"):
+    with pytest.raises(FileError, match="--rerun needs the dataset"):
         grown(write, tmp_path / "out", ONE, rerun="limit")
     with pytest.raises(ValueError, match="rerun: must be failed or limit, not 'all'"):
         grown(write, tmp_path / "out", ONE, rerun="all")
     grown(write, tmp_path / "out", SINGLE)
-    with pytest.raises(StoreError, match="leave out one of the two"):
+    with pytest.raises(FileError, match="leave out one of the two"):
         grown(write, tmp_path / "out", SINGLE, rerun="limit", fresh=True)
     refused(invoke("run", write(ONE), "--rerun", "limit", "--dry-run"), "--dry-run: estimates whole runs only")
     assert (tmp_path / "out" / "small.nc").exists()

@@ -10,7 +10,7 @@ from support import Write
 from support.runs import Heard, Stop, same_numbers
 
 import sweep
-from sweep import ConfigError
+from sweep import InputError
 from sweep.config import load_config
 from sweep.engine import local
 from sweep.engine.estimate import estimate
@@ -138,7 +138,7 @@ def test_critical_spins_of_the_others(write: Write) -> None:
 
 
 def test_a_trajectory_of_such_a_body_is_refused(write: Write) -> None:
-    with pytest.raises(ConfigError, match="upright rest is not stable"):
+    with pytest.raises(InputError, match="upright rest is not stable"):
         sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.05)
 
 
@@ -163,7 +163,7 @@ def test_a_fixed_step_is_judged_by_the_bodies_that_there_are(write: Write) -> No
     """With so small a moment the rattle would be faster."""
     text = "body: {Ixx: [2, 1.0e-3], Iyy: 20, Izz: 21, Ixy: 0}\nfriction: {mu: 60}\nintegrator: {step: 0.8}\n"
     assert load_config(write(text)).integrator.step == 0.8
-    with pytest.raises(ConfigError, match="a quarter of the rattle's period"):
+    with pytest.raises(InputError, match="a quarter of the rattle's period"):
         load_config(write(text), {"Izz": 20.0})
 
 

@@ -14,15 +14,15 @@ from support.own import FADING, PENDULUM
 from support.runs import Heard, same_numbers, settled
 
 import sweep
-from sweep.config import ConfigError, load_config
+from sweep.config import InputError, load_config
 from sweep.engine.plan import kernels
+from sweep.faults import FileError
 from sweep.kernels import build as builder
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.theory.stability import stable_ranges
 from sweep.plots import labels, trajectories
 from sweep.prediction import predict
-from sweep.results.store import StoreError
 from sweep.results.summary import describe
 
 FEW = {"damping": [0.3, 0.5, 0.7], "torque": [0.5, 1.0, 1.2, 1.5], "t_end": 60}
@@ -84,7 +84,7 @@ def test_another_file_goes_on_with_nothing(folder: Path, more: dict[str, Any]) -
     before = load_config(folder / "pendulum.yaml").origin.digest
     (folder / "pendulum.py").write_text(PENDULUM.replace("2 / 3", "3 / 4"), encoding="utf-8")
     after = load_config(folder / "pendulum.yaml").origin.digest
-    with pytest.raises(StoreError) as refusal:
+    with pytest.raises(FileError) as refusal:
         sweep.run(folder / "pendulum.yaml", folder, **FEW | more)
     assert f"- model_sha256: {before}" in str(refusal.value)
     assert f"+ model_sha256: {after}" in str(refusal.value)
@@ -152,7 +152,7 @@ It fails late at high spins: one text for two tests, for each text takes a kerne
 def test_an_error_in_a_worker_names_its_line(folder: Path, client: distributed.Client) -> None:
     (folder / "pendulum.py").write_text(ROLLING, encoding="utf-8")
     for where in (None, client):
-        with pytest.raises(ConfigError, match=r"pendulum.py:\d+: ValueError: too much") as error:
+        with pytest.raises(InputError, match=r"pendulum.py:\d+: ValueError: too much") as error:
             sweep.run(folder / "pendulum.yaml", client=where, **FEW)
         assert 'raise ValueError("too much")' in ROLLING.splitlines()[error.value.faults[0].line - 1]
 
@@ -170,7 +170,7 @@ def test_what_does_not_compile_is_told_with_its_line(folder: Path, file: str, ol
     text = own.SHOWN[f"{file}.py"].replace(old, new, 1) + "\n\ndef half(x):\n    return x\n"
     (folder / f"{file}.py").write_text(text, encoding="utf-8")
     line = text[: text.index(new)].count("\n") + 1
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(InputError) as error:
         sweep.run(folder / f"{file}.yaml")
     (fault,) = error.value.faults
     assert (fault.file, fault.line) == (str(folder / f"{file}.py"), line), fault

@@ -132,7 +132,7 @@ def test_trajectories_of_samples_are_those_of_the_run(write: Write) -> None:
     assert "sample" not in sweep.trajectory(scene, **named).coords
     medians = sweep.trajectory(scene, t_end=10)
     assert (medians["n0"].item(), medians["x0"].item()) == (0.05, 0.01)
-    with pytest.raises(sweep.ConfigError, match="samples: needs a parameter that is a distribution"):
+    with pytest.raises(sweep.InputError, match="samples: needs a parameter that is a distribution"):
         sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, samples=3)
 
 

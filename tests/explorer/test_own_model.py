@@ -8,7 +8,7 @@ from support import own
 from support.own import PENDULUM
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
 from sweep.explorer import export, state
 from sweep.explorer.runner import Job
 from sweep.explorer.setup import Setup, usable, why_still
@@ -40,7 +40,7 @@ def setup(source: Source, folder: Path) -> Setup:
 def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweep.models.user.loading.load", lambda origin: pytest.fail(f"ran {origin.place}"))
     assert usable(source) is None
-    with pytest.raises(ConfigError, match="refusing to run user code named inside a da"):
+    with pytest.raises(InputError, match="refusing to run user code named inside a da"):
         Setup(source)
     why = f"Its model is user code, {folder / 'pendulum.py'}; name it to run trajectories: "
     assert why_still(source) == f"{why}sweep explore FILE --model MODEL."
@@ -74,7 +74,7 @@ def test_no_other_code_is_run(source: Source, folder: Path, tiny: Path, monkeypa
         (bare, folder / "pendulum.py", "--model: the model of bare.nc is not a user's; leave the option out$"),
         (open_source(tiny), folder / "pendulum.py", "--model: the model of .* is not a user's; leave the option out$"),
     ):
-        with pytest.raises(ConfigError, match=f"^{message}"):
+        with pytest.raises(InputError, match=f"^{message}"):
             Setup(dataset, str(model), lambda words: pytest.fail(words))
 
 

@@ -12,8 +12,8 @@ import xarray as xr
 import sweep
 from sweep.explorer import slices, state
 from sweep.explorer.slices import PlacedAxis, Source, open_source
+from sweep.faults import FileError
 from sweep.kernels.status import LIFT_OFF
-from sweep.results.store import StoreError
 
 
 @pytest.mark.parametrize(("x", "y"), list(permutations(("mu", "b", "n0"), 2)))
@@ -94,7 +94,7 @@ def test_one_axis_is_a_row(opened: xr.Dataset) -> None:
 def test_what_has_no_map_is_refused(
     show: Callable[[xr.Dataset], object], change: Callable[[xr.Dataset], xr.Dataset], said: str, opened: xr.Dataset
 ) -> None:
-    with pytest.raises(StoreError, match=said):
+    with pytest.raises(FileError, match=said):
         show(change(opened))
 
 

@@ -19,10 +19,10 @@ from click.testing import CliRunner
 
 from sweep.cli import main
 from sweep.cli.options import loaded
-from sweep.config import ConfigError, load_config
+from sweep.config import InputError, load_config
 from sweep.config.schema import PATHS
+from sweep.faults import FileError
 from sweep.parameters import PARAMETERS
-from sweep.results.store import StoreError
 
 from .text import KEYS, ODD, block, damage, near_valid, tree
 
@@ -53,7 +53,7 @@ def _refused(call: Callable[[], Any], *files: str) -> Any:
     """What `call` returns, or None if it refuses the input."""
     try:
         return call()
-    except (ConfigError, StoreError) as error:
+    except (InputError, FileError) as error:
         check_refusal(error, *files)
         return None
 

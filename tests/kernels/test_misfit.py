@@ -11,13 +11,13 @@ from support.cli import invoke
 from support.runs import Heard, same_numbers
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
 from sweep.explorer.setup import usable
 from sweep.explorer.slices import Source
+from sweep.faults import FileError
 from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 from sweep.models.ladder import slip
 from sweep.models.model import take
-from sweep.results.store import StoreError
 from sweep.results.summary import describe
 from sweep.studies.study import measuring
 
@@ -98,7 +98,7 @@ def test_another_film_is_another_run(write: Write, config: Path, tmp_path: Path)
     assert "6 of 8" in grown.attrs["taken_over"]
     np.testing.assert_array_equal(grown.misfit.sel(mu=first.mu), first.misfit)
     film(write, np.linspace(0, 150, 301), turned=0.1)
-    with pytest.raises(StoreError, match="the film differs"):
+    with pytest.raises(FileError, match="the film differs"):
         sweep.run(config, tmp_path / "out", mu=[40, 60, 80, 100])
     assert sweep.run(config).attrs["film_sha256"] != first.attrs["film_sha256"]
 
@@ -123,7 +123,7 @@ def test_it_is_drawn_told_and_explored(config: Path, tmp_path: Path) -> None:
 )
 @pytest.mark.usefixtures("config")
 def test_what_cannot_be_measured_is_refused_in_one_line(write: Write, text: str, words: str) -> None:
-    with pytest.raises(ConfigError) as refusal:
+    with pytest.raises(InputError) as refusal:
         sweep.load_config(write(text))
     assert words in str(refusal.value)
     assert len(refusal.value.faults) == 1
@@ -131,5 +131,5 @@ def test_what_cannot_be_measured_is_refused_in_one_line(write: Write, text: str,
 
 def test_a_film_of_headings_is_refused(write: Write) -> None:
     film(write, np.linspace(0, 150, 301), "time,heading,error")
-    with pytest.raises(ConfigError, match="shows a heading, but a misfit needs a spin"):
+    with pytest.raises(InputError, match="shows a heading, but a misfit needs a spin"):
         sweep.load_config(write(TEXT))

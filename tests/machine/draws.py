@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from support import ROOT
 
-from sweep.config import Config, ConfigError, load_config
+from sweep.config import Config, InputError, load_config
 from sweep.config.distributions import FAMILIES
 from sweep.config.schema import PATHS, schema_of
 from sweep.kernels.measures import MEASURES, chosen
@@ -180,7 +180,7 @@ def accepted(flat: Flat, base: str = "paper") -> tuple[Flat, Config]:
         try:
             check_pictures(config := load_config(nested(flat)))
             return flat, config
-        except ConfigError as error:
+        except InputError as error:
             check_refusal(error, "")
             for fault in error.faults:
                 paths = [".".join(map(str, fault.path[:k])) for k in range(len(fault.path), 0, -1)]

@@ -34,9 +34,9 @@ import sweep
 from machine import draws, oracles, words
 from machine.draws import Draws, Flat, Piece
 from machine.meetings import Features, Meetings, features
-from sweep.config import Config, ConfigError, load_config
+from sweep.config import Config, InputError, load_config
 from sweep.config.document import parse_value
-from sweep.faults import Refused
+from sweep.faults import Error
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
 from sweep.plots.formats import PICTURES
 from sweep.results.kind import RUN, kind, require_whole
@@ -138,7 +138,7 @@ class Machine(RuleBasedStateMachine):
         note(f"# {what}")
         try:
             return call()
-        except Refused as error:
+        except Error as error:
             check_refusal(error, *files, "")
             event(f"refused: {what}")
             return None
@@ -273,7 +273,7 @@ class Machine(RuleBasedStateMachine):
 
     def _allowed(self, document: Any) -> bool:
         """Whether a configuration is accepted and takes little time."""
-        with suppress(Refused):
+        with suppress(Error):
             return draws.affordable(load_config(document), self.pool)
         return False
 
@@ -291,7 +291,7 @@ class Machine(RuleBasedStateMachine):
         values = {name: float(self.rows[name][cell[0]]) for name in self.varying}
         scene = self.scene.with_({}, "cases", "samples", "refine")
         if self.rows["status"][cell[0]] == IMPOSSIBLE:
-            with pytest.raises(ConfigError):
+            with pytest.raises(InputError):
                 sweep.trajectory(scene, **values)
         elif oracles.simulated(self.found)[cell[0]]:
             followed = self.ask(
@@ -312,7 +312,7 @@ class Machine(RuleBasedStateMachine):
             settings = [f"--set={path}={json.dumps(self.scene.flat[path])}" for path in paths]
             with nothing_drawn():
                 invoke("run", str(file), *settings, f"--output={folder}", "--quiet")
-            found = sweep.open(next(folder.glob("*.nc")))
+            found = sweep.open_dataset(next(folder.glob("*.nc")))
         else:
             found = self._run(config)
         self._compare(found)
@@ -461,7 +461,7 @@ class Machine(RuleBasedStateMachine):
     def _reopened(self, dataset: xr.Dataset) -> xr.Dataset | None:
         """A dataset that is saved is the same when it is opened."""
         file = self._new(".nc")
-        again = self.ask("open", lambda: sweep.open(file), str(file)) if self._saved(dataset, file) else None
+        again = self.ask("open", lambda: sweep.open_dataset(file), str(file)) if self._saved(dataset, file) else None
         if again is not None:
             xr.testing.assert_identical(again.drop_attrs(deep=False), dataset.drop_attrs(deep=False))
         return again
@@ -562,5 +562,5 @@ class Machine(RuleBasedStateMachine):
         try:
             given = {path: parse_value(text, path) for path, _, text in pairs}
             return draws.affordable(load_config(self.scene.with_({}), given), self.pool)
-        except Refused:
+        except Error:
             return True

@@ -94,5 +94,5 @@ def test_extreme_numbers_are_predicted_without_a_warning(model: str, extreme: di
 
 @pytest.mark.parametrize("model", ["slip", "analytic", "averaged", "slow"])
 def test_a_body_that_is_hardly_there_is_refused(model: str) -> None:
-    with pytest.raises(sweep.ConfigError, match="differ by a factor of more than"):
+    with pytest.raises(sweep.InputError, match="differ by a factor of more than"):
         sweep.load_config({"model": model, "friction": {"mu": 60}}, {"c": 1e-300})

@@ -290,5 +290,5 @@ def test_the_steps_are_vector_instructions() -> None:
 def test_the_model_draws_what_it_foresees_and_measures_counts_alone() -> None:
     asked: dict[str, Any] = {"model": "slow", "friction": {"mu": 60}}
     assert sweep.load_config(asked | {"picture": ["foreseen_sure"]}).picture == ("foreseen_sure",)
-    with pytest.raises(sweep.ConfigError, match=r"margin cannot be measured .*; choose from reversals$"):
+    with pytest.raises(sweep.InputError, match=r"margin cannot be measured .*; choose from reversals$"):
         sweep.load_config(asked | {"measure": ["reversals", "margin"]})

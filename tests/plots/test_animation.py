@@ -14,7 +14,7 @@ from support.cli import invoke, refused
 from support.runs import Stop
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
 from sweep.plots import animation, body
 
 
@@ -106,7 +106,7 @@ def test_a_page_asks_nothing_of_the_network(tmp_path: Path) -> None:
 def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path) -> None:
     config, setting, clips = write(), {"mu": 60, "b": 3, "n0": 0.05, "t_end": 20}, []
     sweep.trajectory(config, **setting).to_netcdf(tmp_path / "one.nc")
-    for source, values in ((config, setting), (tmp_path / "one.nc", {}), (sweep.open(tmp_path / "one.nc"), {})):
+    for source, values in ((config, setting), (tmp_path / "one.nc", {}), (sweep.open_dataset(tmp_path / "one.nc"), {})):
         sweep.animate(source, tmp_path / "clip.gif", begin=2, end=4, speed=10, **values)
         clips.append((tmp_path / "clip.gif").read_bytes())
     stretch = ("--from", "2", "--to", "4", "--speed", "10")
@@ -119,32 +119,32 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
 
 
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"^source: has no attitude"):
+    with pytest.raises(InputError, match=r"^source: has no attitude"):
         animation.animate(turning().drop_vars("heading"))
     for part in ({"trajectory": 0}, {"trajectory": []}, {"time": []}):
-        with pytest.raises(ConfigError, match=r"^source: has no axis trajectory or time"):
+        with pytest.raises(InputError, match=r"^source: has no axis trajectory or time"):
             animation.animate(turning().isel(part))
-    with pytest.raises(ConfigError, match=r"^source: .*at most 6"):
+    with pytest.raises(InputError, match=r"^source: .*at most 6"):
         animation.animate(turning(7))
-    with pytest.raises(ConfigError, match=r"^begin: nothing lies between"):
+    with pytest.raises(InputError, match=r"^begin: nothing lies between"):
         animation.animate(turning(), begin=11)
-    with pytest.raises(ConfigError, match=r"^begin: nothing lies between"):
+    with pytest.raises(InputError, match=r"^begin: nothing lies between"):
         animation.animate(turning(), begin=-np.inf, end=-1)
     for speed in (0, -5, np.nan, np.inf):
-        with pytest.raises(ConfigError, match=f"speed: {speed:g}; give a finite number above zero"):
+        with pytest.raises(InputError, match=f"speed: {speed:g}; give a finite number above zero"):
             animation.animate(turning(), speed=speed)
     for name, speed, words in (
         ("clip.gif", 0.1, "80 s, and may last 60 s; give a speed of 0.133 or more, or write an mp4$"),
         (None, 1e-300, r"8e\+300 s, and may last 3600 s; give a speed of 0.00222 or more$"),
     ):
-        with pytest.raises(ConfigError, match=f"speed: the clip would last {words}"):
+        with pytest.raises(InputError, match=f"speed: the clip would last {words}"):
             animation.animate(turning(), name and tmp_path / name, end=8, speed=speed)
     without = mpl.rc_context({"animation.ffmpeg_path": "no-such-program"})
-    with without, pytest.raises(ConfigError, match="ffmpeg, which is not installed"):
+    with without, pytest.raises(InputError, match="ffmpeg, which is not installed"):
         animation.check(tmp_path / "clip.mp4")
     refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
 
 
 def test_a_model_without_an_attitude_is_refused_before_it_is_simulated() -> None:
-    with pytest.raises(ConfigError, match="model: the bodies of effective have no attitude; animate slip or noslip"):
+    with pytest.raises(InputError, match="model: the bodies of effective have no attitude; animate slip or noslip"):
         sweep.animate({"model": "effective", "friction": {"mu": 60}}, reporter=Stop(0))

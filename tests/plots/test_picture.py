@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from support.cli import invoke, refused
 from support.figures import constants, entries, made, maps
 
-from sweep.config import ConfigError
+from sweep.config import InputError
 from sweep.kernels.status import DIVERGED, TIME_LIMIT
 from sweep.plots import panels, picture, scales
 from sweep.plots.hatches import outline
@@ -247,7 +247,7 @@ def test_a_page_fits_a_screen(starts: int) -> None:
         wide, high = picture.plot(dataset, variable, x="b", y="mu").get_size_inches() * 110
         assert wide <= 1700
         assert high <= 1500
-    with pytest.raises(ConfigError, match="9 panels"):
+    with pytest.raises(InputError, match="9 panels"):
         picture.plot(made(n0=np.linspace(0.02, 0.1, 9)), "reversals", x="b", y="mu")
 
 
@@ -301,7 +301,7 @@ def test_axes_in_any_order_of_values() -> None:
 )
 def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
     whole = 1.0 * made().reversals
-    with pytest.raises(ConfigError, match=f"^{said}"):
+    with pytest.raises(InputError, match=f"^{said}"):
         picture.plot(made().assign(t_first_reversal=whole, t_first_reversal_predicted=2 * whole), **wrong)
 
 

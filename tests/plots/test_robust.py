@@ -15,7 +15,8 @@ from matplotlib.figure import Figure
 from support.figures import entries, made
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
+from sweep.faults import FileError
 from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
 from sweep.plots.figure import opaque
@@ -23,7 +24,6 @@ from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.kind import CRITICAL
 from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES, probabilities
-from sweep.results.store import StoreError
 
 FORMULAS: dict[str, Any] = {"name": "formulas", "friction": {"mu": 60}}
 
@@ -65,7 +65,7 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
         assert scale.norm.boundaries[-1] > top
     assert perf_counter() - start < 5
     for variable in ("reversals", "spin_final"):
-        with pytest.raises(ConfigError, match=r"limits: 0\.\.1e\+16; give numbers up to 1e\+15$"):
+        with pytest.raises(InputError, match=r"limits: 0\.\.1e\+16; give numbers up to 1e\+15$"):
             picture.plot(made(), variable, limits=(0, 1e16))
 
 
@@ -83,13 +83,13 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
     ],
 )
 def test_what_cannot_be_drawn_is_refused(damage: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(InputError, match=said):
         picture.plot(damage(made()))
 
 
 def test_an_axis_without_numbers_has_no_nearest_value() -> None:
     stacked = made().stack(both=("mu", "b"))
-    with pytest.raises(ConfigError, match="the axis both is stacked; unstack it"):
+    with pytest.raises(InputError, match="the axis both is stacked; unstack it"):
         picture.plot(stacked, sel={"both": 1.0})
 
 
@@ -104,23 +104,23 @@ def test_an_axis_without_numbers_has_no_nearest_value() -> None:
     ],
 )
 def test_datasets_of_other_kinds_that_are_not_whole_are_refused(found: xr.Dataset, said: str) -> None:
-    with pytest.raises(StoreError, match=f"^the dataset: {said}"):
+    with pytest.raises(FileError, match=f"^the dataset: {said}"):
         picture.plot(found)
 
 
 def test_boundaries_without_a_whole_number_are_not_drawn() -> None:
     curves = sweep.boundaries({"friction": {"mu": [60, 80]}}, n0=[0.02, 0.06], t_end=1000, bracket=0.1)
-    with pytest.raises(StoreError, match=r"^the dataset: has no whole numbers in level"):
+    with pytest.raises(FileError, match=r"^the dataset: has no whole numbers in level"):
         picture.plot(curves.where(False))
 
 
 def test_samples_without_a_status_or_counts() -> None:
     """A mean of the status is none, so that nobody knows the number of samples, and a mean over counts has no sense."""
-    with pytest.raises(ConfigError, match="the probabilities have lost their axis count"):
+    with pytest.raises(InputError, match="the probabilities have lost their axis count"):
         picture.plot(sampled().mean())
     for part in (sampled().mean("n0"), sampled().isel(n0=0).drop_vars("status")):
         assert entries(picture.plot(part)) == ["share of the samples"]
-    with pytest.raises(ConfigError, match="reversals has no axis count; its axes are n0, sample"):
+    with pytest.raises(InputError, match="reversals has no axis count; its axes are n0, sample"):
         picture.plot(sampled(), "reversals", y="count")
 
 
@@ -203,9 +203,7 @@ def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None
 def test_a_size_without_room_is_refused_with_one_that_has(size: dict[str, Any]) -> None:
     style: Any = {"font.size": 14, "axes.titlesize": 20}
     with mpl.rc_context(style):
-        with pytest.raises(
-            ConfigError, match=f"^{next(iter(size))}: .* is too small for this figure; give "
-        ) as refused:
+        with pytest.raises(InputError, match=f"^{next(iter(size))}: .* is too small for this figure; give ") as refused:
             picture.plot(made(), **size)
         given = str(refused.value).split("give ")[1].split(",")[0]
         figsize = tuple(map(float, given.removesuffix(" inches").split(" × "))) if "figsize" in size else None

@@ -12,9 +12,9 @@ import xarray as xr
 from support import ROOT, Write
 
 import sweep
+from sweep.faults import FileError
 from sweep.results import provenance
 from sweep.results.dataset import STATUSES, VARIABLES
-from sweep.results.store import StoreError
 from sweep.results.writing import replacing
 
 NOT_BY_DEFAULT = """method t_first_reversal t_first_reversal_predicted cycle_mean cycle_variation lyapunov
@@ -89,7 +89,7 @@ def test_no_temporary_file_survives_a_failure(tmp_path: Path) -> None:
             temporary.write_text("half")
             raise OSError("full")
 
-    with pytest.raises(StoreError, match="cannot be written: full"):
+    with pytest.raises(FileError, match="cannot be written: full"):
         fill_the_disk()
     assert list(tmp_path.iterdir()) == []
 

@@ -37,7 +37,7 @@ def test_the_dataset_of_changes_is_described_and_not_drawn(tmp_path: Path) -> No
     assert "3 reversals now; the requested count begins at these values of each parameter:" in said
     assert re.search(r"mu +60 +\S+ +\([-+][\d.]+%\): 4 reversals", said)
     assert re.search(r"b +3 +none found", said)
-    with pytest.raises(sweep.ConfigError, match="changes of a body have no figure"):
+    with pytest.raises(sweep.InputError, match="changes of a body have no figure"):
         sweep.plot(found)
 
 
@@ -93,5 +93,5 @@ def test_a_body_in_si_changes_alike() -> None:
     ],
 )
 def test_what_is_refused(change: dict[str, Any], words: str) -> None:
-    with pytest.raises(sweep.ConfigError, match=words):
+    with pytest.raises(sweep.InputError, match=words):
         sweep.changes(BODY, **change)

@@ -12,7 +12,7 @@ from support.kernels import kernel
 from support.physics import IN_SI
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
 from sweep.engine.executor import execute
 from sweep.grid import Array
 from sweep.kernels.status import TIME_LIMIT
@@ -154,7 +154,7 @@ STONE = IN_SI | {
 
 
 def test_a_start_by_angles_has_no_spin_to_search() -> None:
-    with pytest.raises(ConfigError, match="give x0 and y0"):
+    with pytest.raises(InputError, match="give x0 and y0"):
         sweep.critical(STONE | {"start": {"roll": "1 deg"}})
 
 

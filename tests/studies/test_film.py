@@ -9,7 +9,7 @@ from support import Write
 from support.physics import STONE
 
 import sweep
-from sweep.config import ConfigError, film
+from sweep.config import InputError, film
 
 TIMES = np.arange(20) / 10
 SPINS = np.cos(TIMES)
@@ -65,7 +65,7 @@ def test_a_table_of_tracker_has_what_it_followed_above_the_names(
     found = film.read(write(text.replace(".", ",") if comma else text, "tracker.txt"))
     np.testing.assert_allclose([found.time, found.value], [TIMES[:-2], SPINS[1:-1]], rtol=1e-9, atol=1e-9)
     assert (found.what, found.left_out) == ("spin" if name == "ω" else "heading", 2)
-    with pytest.raises(ConfigError, match=r"tracker\.txt:2:.* it has t, x, y"):
+    with pytest.raises(InputError, match=r"tracker\.txt:2:.* it has t, x, y"):
         film.read(write(text.replace(name, "y"), "tracker.txt"))
 
 
@@ -74,18 +74,18 @@ def test_columns_may_be_asked_for_by_name(write: Write) -> None:
     found = film.read(path, "clock (ms)", "turn (deg/s)")
     np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12, atol=1e-12)
     assert [film.read(path, "", each).what for each in ("turn", "z", "turn (deg)")] == ["spin", "gyroscope", "heading"]
-    with pytest.raises(ConfigError, match=r"--spin-column: there is no column tunr .* .did you mean turn"):
+    with pytest.raises(InputError, match=r"--spin-column: there is no column tunr .* .did you mean turn"):
         film.read(path, "", "tunr (deg/s)")
 
 
 def test_the_accelerations_of_a_logger_are_no_spins(write: Write) -> None:
-    with pytest.raises(ConfigError, match="'gyroscope z"):
+    with pytest.raises(InputError, match="'gyroscope z"):
         film.read(write(table("time,seconds_elapsed,z,y,x", TIMES, TIMES, UP, UP, UP), "Accelerometer.csv"))
 
 
 def test_degrees_taken_for_radians_are_refused(write: Write) -> None:
     path = write(table("t (s),n", TIMES, 400 + SPINS), "film.csv")
-    with pytest.raises(ConfigError, match="the film turns at 401 rad/s; if its spins are in degrees, name the unit"):
+    with pytest.raises(InputError, match="the film turns at 401 rad/s; if its spins are in degrees, name the unit"):
         sweep.fit(write(STONE), path, ["mu"])
 
 
@@ -165,7 +165,7 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
 )  # fmt: skip
 def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, line: str, words: str) -> None:
     path = write(text, "film.csv")
-    with pytest.raises(ConfigError) as refusal:
+    with pytest.raises(InputError) as refusal:
         film.read(path)
     assert len(refusal.value.faults) == 1
     assert words in str(refusal.value)
@@ -175,7 +175,7 @@ def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, lin
 def test_a_film_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     (tmp_path / "film.csv").write_bytes("t,spin (°/s)\n".encode("cp1252"))
     for name, words in (("none.csv", "no such file"), ("film.csv", "not UTF-8 text")):
-        with pytest.raises(ConfigError, match=rf"{name}: {words}"):
+        with pytest.raises(InputError, match=rf"{name}: {words}"):
             film.read(tmp_path / name)
 
 
@@ -197,9 +197,9 @@ def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
     write: Write, header: str, clock: float, words: str
 ) -> None:
     path = write(table(header, TIMES * clock, SPINS), "film.csv")
-    with pytest.raises(ConfigError, match=re.escape(words)):
+    with pytest.raises(InputError, match=re.escape(words)):
         sweep.fit(write(STONE), path, ["mu"])
-    with pytest.raises(ConfigError, match="has rows 100 s apart if its times are in s; name the unit in the header"):
+    with pytest.raises(InputError, match="has rows 100 s apart if its times are in s; name the unit in the header"):
         sweep.fit(
             write(STONE.replace("t_end: 5", "t_end: 5000")), write(table("t,n", TIMES * 1e3, SPINS), "f.csv"), ["mu"]
         )
@@ -207,5 +207,5 @@ def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
 
 def test_a_film_in_seconds_is_none_of_a_body_in_the_paper_s_units(write: Write) -> None:
     path = write(table("t (s),n", TIMES, SPINS), "film.csv")
-    with pytest.raises(ConfigError, match=r"the film gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
+    with pytest.raises(InputError, match=r"the film gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
         sweep.fit(write("friction: {mu: [30, 100]}\n"), path, ["mu"])

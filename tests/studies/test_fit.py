@@ -16,15 +16,15 @@ from support.cli import invoke
 from support.physics import turned_inertia
 
 import sweep
-from sweep.config import ConfigError
+from sweep.config import InputError
 from sweep.config.film import Film
 from sweep.explorer.slices import Source
+from sweep.faults import FileError
 from sweep.kernels.samples import Seen, sampled
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
 from sweep.plots.fit import draw
-from sweep.results.store import StoreError
 from sweep.studies.concurrent import run_concurrently
 from sweep.studies.filmed import shown
 from sweep.studies.intervals import intervals
@@ -284,14 +284,14 @@ def test_the_command_writes_what_runs_the_fitted_body(
     said = invoke("fit", write(SCENE), film, "--free", "mu,n0", "--output", tmp_path / "out")
     assert said.exit_code == 0, said.output
     assert "95 %" in said.stdout
-    written = sweep.open(tmp_path / "out" / "scene_fit.nc")
+    written = sweep.open_dataset(tmp_path / "out" / "scene_fit.nc")
     xr.testing.assert_equal(written.drop_attrs(), found.drop_attrs())
     body = sweep.load_config(tmp_path / "out" / "scene_fit.yaml")
     assert body.name == "scene_fit"
     assert body.parameters["mu"].numbers[0] == written.value.values[0]
     for verb in ("info", "plot"):
         assert invoke(verb, tmp_path / "out" / "scene_fit.nc").exit_code == 0
-    with pytest.raises(StoreError, match="has a fit; open a dataset of run"):
+    with pytest.raises(FileError, match="has a fit; open a dataset of run"):
         Source(written)
 
 
@@ -426,7 +426,7 @@ def test_an_animation_of_several_laws_is_that_of_the_best(of_laws: xr.Dataset) -
 @pytest.mark.parametrize("laws", [(), ("viscous", "coulomb")])
 def test_a_film_with_an_instant_without_a_number_is_refused(write: Write, laws: tuple[str, ...]) -> None:
     film = Film(np.arange(3.0), np.array([0.05, np.nan, 0.05]))
-    with pytest.raises(ConfigError, match="not a number; leave out that instant"):
+    with pytest.raises(InputError, match="not a number; leave out that instant"):
         sweep.fit(write(SCENE), film, ["mu"], n0=0.05, laws=laws, progress=False)
 
 
@@ -435,7 +435,7 @@ def test_degrees_taken_for_radians_are_refused_at_once(write: Write) -> None:
     times = np.linspace(0, 6, 200)
     stone = write(STONE.replace("mu: [0.1, 0.9], speed: [0.2, 1.5]", "mu: 0.3, speed: 0.01"))
     spins, free = 6.5 * np.exp(-times / 0.4), ["mu", "n0", "x0", "y0"]
-    with pytest.raises(ConfigError, match=r"takes \S+ steps, .*; check the units of the film, which shows up to 372"):
+    with pytest.raises(InputError, match=r"takes \S+ steps, .*; check the units of the film, which shows up to 372"):
         sweep.fit(stone, Film(times, np.degrees(spins)), free, progress=False, t_end=10)
     with patch("sweep.studies.fit._found", Mock(side_effect=InterruptedError)), pytest.raises(InterruptedError):
         sweep.fit(stone, Film(times, spins), free, progress=False, t_end=10)
@@ -460,7 +460,7 @@ def test_degrees_taken_for_radians_are_refused_at_once(write: Write) -> None:
 )
 def test_what_cannot_be_fitted_is_refused(write: Write, free: list[str], overrides: dict[str, Any], words: str) -> None:
     film = Film(np.arange(9.0), np.ones(9))
-    with pytest.raises(ConfigError) as refusal:
+    with pytest.raises(InputError) as refusal:
         sweep.fit(write(SCENE), film, free, **overrides)
     assert words in str(refusal.value)
     assert len(refusal.value.faults) == 1

@@ -121,7 +121,7 @@ def test_a_trajectory_without_an_end_ends_when_it_has_settled(write: Write) -> N
 def test_more_samples_than_memory_holds_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweep.studies.trajectory.MAX_SAMPLES", 100)
     config = load_config({"friction": {"mu": 60}}, {"t_end": 60.0})
-    with pytest.raises(sweep.ConfigError, match=r"every: the samples are too many .*; give 1\.2 "):
+    with pytest.raises(sweep.InputError, match=r"every: the samples are too many .*; give 1\.2 "):
         sweep.trajectory(config, b=[3, 4], every=1.1)
     assert sweep.trajectory(config, b=[3, 4], every=1.2).sizes["time"] == 51
 
@@ -138,7 +138,7 @@ def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
 def test_a_body_of_unknown_shape_is_not_drawn(write: Write) -> None:
     """A user's model has the attitude of a rigid body, and dimensions of its own."""
     other = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).rename({"a": "a1"})
-    with pytest.raises(sweep.ConfigError, match="no a, b and c"):
+    with pytest.raises(sweep.InputError, match="no a, b and c"):
         sweep.animate(other)
 
 

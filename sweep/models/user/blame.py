@@ -7,17 +7,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from os.path import abspath
 
-from sweep.faults import ConfigError, fault_of
+from sweep.faults import InputError, fault_of
 from sweep.jit import compiler_said
 from sweep.models.origin import Origin
 
 
 @contextmanager
 def blamed(origin: Origin | None, *, always: bool = False) -> Iterator[None]:
-    """Turn errors raised by the code of a user's model, or all errors, into a `ConfigError` that gives the place."""
+    """Turn errors raised by the code of a user's model, or all errors, into a `InputError` that gives the place."""
     try:
         yield
-    except ConfigError:
+    except InputError:
         raise
     except Exception as error:
         place, line = _place(error, origin) if origin else ("", None)

@@ -40,7 +40,7 @@ def load(origin: Origin) -> Model | SlipWith:
 
     Raises
     ------
-    ConfigError
+    InputError
         if the code cannot be run, or does not define a model.
     """
     made: Model | SlipWith

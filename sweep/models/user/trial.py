@@ -29,7 +29,7 @@ Faults = Iterator[tuple[Any, str]]
 
 
 def check(made, origin: Origin) -> None:
-    """Raise a `ConfigError` for the first fault of the MODEL that a file or an entry point defines."""
+    """Raise a `InputError` for the first fault of the MODEL that a file or an entry point defines."""
     _refuse(_declared(made), origin)
 
 
@@ -43,7 +43,7 @@ def try_out(model: Model, columns: Columns, law: Law | None = None) -> None:
 
     Raises
     ------
-    ConfigError
+    InputError
         if one of them returns anything but what it should.
     """
     assert model.origin
