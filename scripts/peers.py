@@ -125,7 +125,7 @@ def our_settings() -> Iterator[Setting]:
 
 
 def our_run(more: dict[str, Any], problem: Problem) -> Array:
-    found = sweep.run({}, **FIXED, b=problem.b, mu=problem.mu, stop_when_settled=False, **more)
+    found = sweep.run({}, **FIXED, b=problem.b, mu=problem.mu, stop_early=False, **more)
     return np.asarray(found["spin_final"].values)
 
 

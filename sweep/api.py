@@ -272,7 +272,7 @@ def trajectory(
     config: ConfigLike,
     *,
     every: float | None = None,
-    stop_when_settled: bool = False,
+    stop_early: bool = False,
     samples: int | None = None,
     progress: bool | None = None,
     reporter: Reporter | None = None,
@@ -287,8 +287,8 @@ def trajectory(
     config, progress, reporter : as for `run`
     every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
         per period of the fastest motion
-    stop_when_settled : end a trajectory once spin and count can no longer change, as a sweep does, instead of at t_end,
-        whatever the configuration says; always so with `t_end: .inf`
+    stop_early : end a trajectory once spin and count can no longer change, as a sweep does, instead of at t_end,
+        whatever the configuration says; always so with `t_end: settled`
     samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
         samples of a run
     values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``; each combination is one trajectory. An axis of
@@ -321,9 +321,7 @@ def trajectory(
     cells = {name: value for name, value in values.items() if name in known}
     settings = {name: value for name, value in values.items() if name not in known}
     with _prepared(config, settings, progress, reporter) as (checked, reporter):
-        found = trajectory(
-            checked, every=every, stop_when_settled=stop_when_settled, samples=samples, reporter=reporter, **cells
-        )
+        found = trajectory(checked, every=every, stop_early=stop_early, samples=samples, reporter=reporter, **cells)
     if cells and (message := first_values(checked, cells)):
         warn(message, stacklevel=2)
     return found

@@ -85,7 +85,7 @@ def _variables() -> tuple[Row, list[Row]]:
 _STATUS_MEANINGS = {
     "not_run": "not simulated",
     "settled": "upright spin is stable, and the remaining rattle can change neither that nor the count",
-    "time_limit": "`t_end` was reached first, or `patience` if the end could not be predicted",
+    "time_limit": "`t_end` was reached first, or the time of `stop_early` if the end could not be predicted",
     "lift_off": "the normal force fell to zero: the body leaves the plane",
     "diverged": "the integration failed, even with shorter steps; the numbers are meaningless",
     "paradox": "Painlevé's paradox: no contact force solves the equations",

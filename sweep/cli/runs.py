@@ -75,7 +75,7 @@ def run(config: Config, rerun: str | None, **how: Any) -> None:
 @click.command()
 @configured
 @AT
-@click.option("--stop-when-settled", is_flag=True,
+@click.option("--stop-early", is_flag=True,
               help="Stop once spin and count can no longer change, as a sweep does, instead of at t_end.")  # fmt: skip
 @click.option("--samples", type=click.IntRange(1), metavar="N",
               help="Follow N samples of the uncertain parameters instead of their medians.")  # fmt: skip

@@ -248,9 +248,9 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
         choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice and not alone else methods.PLAIN
     if "t_end" not in said:
-        found["t_end"] = _longest(schema.T_END, in_si)
-        if ENDING in model.offers and integrator.stop_when_settled:
-            found |= {"t_end": _longest(schema.LATER, in_si), "patience": integrator.patience or found["t_end"]}
+        found["t_end"] = usual = _longest(schema.T_END, in_si)
+        if ENDING in model.offers and ("stop_early" not in said or integrator.first_leg):
+            found |= {"t_end": _longest(schema.LATER, in_si), "stop_early": integrator.first_leg or usual}
     return Integrator(**{**dict(integrator), **found})
 
 

@@ -158,7 +158,7 @@ def unlike(config: Config, film: Film) -> str:
 
     A film in the wrong unit can be a million times too long, and would take a million times longer to follow.
     """
-    last, end = float(film.time[-1]), config.integrator.patient.t_end
+    last, end = float(film.time[-1]), config.integrator.in_one_leg.t_end
     given = "name the unit in the header, such as 'time (ms)'"
     if film.clock and config.units != SI:
         other = named(TIME, config.units) or "those of the model"

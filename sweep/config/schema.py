@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import inf
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
@@ -71,14 +70,16 @@ SAMPLES = 1024
 """Default of `samples`."""
 
 FOREVER = 1e7
-"""Value of `t_end: .inf`, in sqrt(c/g): longer than any rattleback spins. A trajectory that has not settled by then has
-the status `time_limit`."""
+"""Value of `t_end: settled`, in the unit of time: longer than any rattleback spins. A trajectory that has not settled
+by then has the status `time_limit`."""
 
 T_END = 30_000.0
-"""Default of `t_end`, in sqrt(c/g); in SI it is converted with the body's c."""
+"""Default of `t_end`, or of `stop_early` where `t_end` is `LATER`, in sqrt(c/g); in SI converted with the body's c."""
 
 LATER = 1e6
-"""Default of `t_end` where further reversals can be predicted; the default of `patience` is then `T_END`."""
+"""Default of `t_end` where further reversals can be predicted and `stop_early` is a time."""
+
+_SETTLED = "settled"
 
 LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
@@ -112,28 +113,43 @@ class Integrator(Strict):
     )
     t_end: Annotated[
         float,
-        BeforeValidator(lambda raw: FOREVER if raw == inf else _in_si(raw)),
-        Allowed(f".inf or a number > 0 and <= {LATEST:g}"),
+        BeforeValidator(lambda raw: FOREVER if raw == _SETTLED else _in_si(raw)),
+        Allowed(f"{_SETTLED} or a number > 0 and <= {LATEST:g}"),
     ] = Field(
         default=T_END, gt=0, le=LATEST,
-        description=f"time at which an unsettled trajectory ends, in sqrt(c/g); `.inf` means {FOREVER:g}; "
-        f"with `units: SI` in s, by default {T_END:g} sqrt(c/g) of the largest c and the least gravity, rounded up to "
-        f"hundreds, and {LATER:g} sqrt(c/g) where `patience` has a meaning",
+        description="time at which every trajectory ends, in sqrt(c/g) or, with `units: SI`, in s; or `settled`: no "
+        f"limit but {FOREVER:g}. The default is in the table below",
     )  # fmt: skip
-    patience: Annotated[float | None, BeforeValidator(_in_si), Allowed("null or a finite number > 0")] = Field(
-        default=None, gt=0,
-        description="time after which a trajectory of `slip` goes on to `t_end` only if it can be foreseen that its "
-        "spin reverses once more, or that its rattle has wound down by then, in sqrt(c/g); null for all that have not "
-        f"settled; by default {T_END:g} if `t_end` is left out",
-    )  # fmt: skip
-    stop_when_settled: bool = Field(
-        default=True, description="whether a trajectory of a sweep ends once spin and count can no longer change"
+    stop_early: Annotated[
+        bool | Annotated[float, Field(gt=0)], BeforeValidator(_in_si), Allowed("true, false or a finite number > 0")
+    ] = Field(
+        default=True,
+        description="whether a trajectory ends before `t_end` once spin and count can no longer change; or a time, "
+        "after which the others end too, unless their end can be predicted: see the table below",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _ends(cls, raw: Any) -> Any:
+        if isinstance(raw, dict) and raw.get("t_end") == _SETTLED and raw.get("stop_early") is False:
+            raise wrong(f"{_SETTLED} needs stop_early, which is false; give a time", "t_end")
+        return raw
+
     @property
-    def patient(self) -> Integrator:
-        """Return the same settings for dense trajectories and searches, with `t_end` no later than `patience`."""
-        return self.model_copy(update={"t_end": min(self.t_end, self.patience or self.t_end), "patience": None})
+    def settles(self) -> bool:
+        """Whether a trajectory ends once spin and count can no longer change."""
+        return self.stop_early is not False
+
+    @property
+    def first_leg(self) -> float | None:
+        """The time after which only those trajectories go on whose end can be predicted; None for all."""
+        return None if isinstance(self.stop_early, bool) else self.stop_early
+
+    @property
+    def in_one_leg(self) -> Integrator:
+        """Return the same settings for dense trajectories and searches, which end after the first leg."""
+        t_end = min(self.t_end, self.first_leg or self.t_end)
+        return self.model_copy(update={"t_end": t_end, "stop_early": self.settles})
 
 
 def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:

@@ -44,7 +44,8 @@ class Rules:
 
     t_end: float
     tolerance: float
-    patience: float | None = None
+    first_leg: float | None = None
+    """Time after which only those runs go on whose end can be predicted."""
     settles: bool = True
     """Whether a run ends once the spin can reverse no more."""
     fixed: bool = False

@@ -2,8 +2,8 @@
 
 The kernel settles a cell by a bound on what the energy of its rattle can do to the spin (`sweep.kernels.lanes`), or by
 how a rattle that rolls round and round winds down (`sweep.kernels.measures.decay`). Where the bound fails, the cell
-continues. A cell that has not settled by the configuration's `patience` continues to `t_end` only if the slow equations
-predict that its spin will reverse once more, or that its rattle will have wound down before then.
+continues. A cell that has not settled at the end of the first leg (`stop_early`) continues to `t_end` only if the slow
+equations predict that its spin will reverse once more, or that its rattle will have wound down before then.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sweep.models.theory import linear
 from sweep.models.theory.rocking import frequencies
 
 FIRST, LATER = range(2)
-"""Legs of a run: to `patience`, and to `t_end`."""
+"""Legs of a run: to `Rules.first_leg`, and to `t_end`."""
 
 # Safety factor on the change of the spin at the present rates, where the slow equations do not hold.
 _REACH = 4.0
@@ -37,7 +37,7 @@ _LEAST, _NEGLECTED = 0.02, 3.0
 # Above this relative error, the slow equations predict nothing.
 _LARGEST = 0.2
 
-# Length of a window in which a rattle that rolls round is watched, as a share of the patience.
+# Length of a window in which a rattle that rolls round is watched, as a share of the first leg.
 _WINDOW = 0.1
 
 # A rattle rolls round if the body turns by more than one radian while its two modes gain half a radian on each other.
@@ -47,7 +47,7 @@ _ROLLS = 0.5
 def begin(lives: Lives, rows: Array, images: Array, most: Array | float = np.inf) -> None:
     """Let `images` at t = 0 run to their ends, or until `most` steps are done."""
     rules, table = lives.cells.rules, lives.cells.kernel.table(images)
-    first = most if rules.patience is None else np.minimum(most, whole_blocks(rules.patience / table["step"]))
+    first = most if rules.first_leg is None else np.minimum(most, whole_blocks(rules.first_leg / table["step"]))
     if rules.settles:
         watch(lives.take(rows), images)
     lives.note(rows, ("leg", "wary"), 0)
@@ -65,7 +65,7 @@ def over(lives: Lives, rows: Array) -> Array:
     rules, run = lives.cells.rules, lives.take(rows)
     early = too_early(run, lives.notes["wary"][rows] == 0)
     foreseen = settle(run, ~early & rules.settles)
-    first = (lives.notes["leg"][rows] == FIRST) & ~early & (rules.settles and rules.patience is not None)
+    first = (lives.notes["leg"][rows] == FIRST) & ~early & (rules.settles and rules.first_leg is not None)
     later = first & _late(run) & (foreseen | winds_down(run))
     lives.cells.images[rows] = run.images
     _go_on(lives, rows[early], settles=False)
@@ -152,18 +152,18 @@ def whole_blocks(steps: Array) -> Array:
 
 def watch(cells: Cells, images: Array) -> None:
     """Have `images` of cells at t = 0 watched, in place: from the start if they roll round, or in the last window."""
-    table, patience = cells.kernel.table(images), cells.rules.patience
-    if NEXT not in table.layout or patience is None:
+    table, first = cells.kernel.table(images), cells.rules.first_leg
+    if NEXT not in table.layout or first is None:
         return
     surface = cells.model.variant.surface
     slower, faster = frequencies(rigid_body.rocking(cells.columns, surface))
     rolls = faster - slower < _ROLLS * np.abs(starts.spin(cells.columns, surface))
-    table[EVERY] = every = whole_blocks(_WINDOW * patience / (LOOKS * table["step"]))
-    last = whole_blocks(patience / table["step"]) - LOOKS * every
+    table[EVERY] = every = whole_blocks(_WINDOW * first / (LOOKS * table["step"]))
+    last = whole_blocks(first / table["step"]) - LOOKS * every
     table[NEXT] = np.where(rolls, 0.0, np.where(last < 0, np.inf, last))
 
 
 def winds_down(cells: Cells) -> Array:
     """Return whose rattle will have wound down before `t_end`, so that the rest can be followed, (cells,)."""
-    patience, t_end, left = cells.rules.patience or 0.0, cells.rules.t_end, cells.recorded(LEFT)
-    return np.asarray((left > 0) & (left * _WINDOW * patience < t_end - patience))
+    first, t_end, left = cells.rules.first_leg or 0.0, cells.rules.t_end, cells.recorded(LEFT)
+    return np.asarray((left > 0) & (left * _WINDOW * first < t_end - first))

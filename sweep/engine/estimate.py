@@ -44,7 +44,7 @@ def estimate(config: Config) -> str:
     share = grid.size / sample.size
     with blamed(config.origin):
         chosen = tuple(each for each in choose(config, sample) if len(each.cells))
-        steps = [np.ceil(config.integrator.patient.t_end / each.step) for each in chosen]
+        steps = [np.ceil(config.integrator.in_one_leg.t_end / each.step) for each in chosen]
         seconds = sum(map(nominal_seconds, _works(config, chosen, steps, share)))
         compiling = compile_seconds(missing(kernels(config, chosen)))
     total = sum(each.sum() for each in steps) * share

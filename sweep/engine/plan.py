@@ -128,7 +128,7 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
 def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, step_rule: Array) -> Cells:
     how, fixed = config.integrator, config.integrator.step != "auto"
     rules = Rules(
-        how.t_end, how.tolerance, how.patience, how.stop_when_settled, fixed, how.estimate_errors,
+        how.t_end, how.tolerance, how.first_leg, how.settles, fixed, how.estimate_errors,
         config.repeats and not fixed,
     )  # fmt: skip
     blank = np.full((7, len(cells)), np.nan), np.empty((0, 0))

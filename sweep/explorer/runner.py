@@ -28,7 +28,7 @@ from sweep.plots.trajectories import lively_until, reversal_times
 from sweep.studies.trajectory import choose, intervals, trajectory
 
 LONG = 30_000.0
-"""End of a trajectory without a time limit (`t_end: .inf`)."""
+"""End of a trajectory without a time limit (`t_end: settled`)."""
 
 MAX_STEPS = 1e8
 """Largest number of steps of a trajectory: an address may ask for any friction, and so for any number of steps."""

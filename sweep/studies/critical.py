@@ -59,7 +59,7 @@ def searchable(config: Config) -> Config:
     parameters = config.parameters | {"n0": Values.one(0.0)}
     cases = {name: v for name, v in config.cases.items() if name != "n0"}
     found = replace(measuring(config), parameters=parameters, cases=cases)
-    return replace(found, integrator=found.integrator.patient)
+    return replace(found, integrator=found.integrator.in_one_leg)
 
 
 class Answer(NamedTuple):

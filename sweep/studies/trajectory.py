@@ -104,7 +104,7 @@ def trajectory(
     config: ConfigLike,
     *,
     every: float | None = None,
-    stop_when_settled: bool = False,
+    stop_early: bool = False,
     samples: int | None = None,
     reporter: Reporter | None = None,
     **at: Any,
@@ -119,8 +119,8 @@ def trajectory(
     config : as `sweep.config.load_config` takes it
     every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
         per period of the fastest motion
-    stop_when_settled : end a trajectory once spin and count can no longer change, as a sweep does. Otherwise it goes to
-        t_end, whatever the configuration says; with `t_end: .inf` it always stops once settled
+    stop_early : end a trajectory once spin and count can no longer change, as a sweep does. Otherwise it goes to
+        t_end, whatever the configuration says; with `t_end: settled` it always stops once settled
     samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
         samples of a run
     reporter : receives progress, counted in time, and messages; silent by default
@@ -142,8 +142,8 @@ def trajectory(
     if every is not None and not (is_number(each := plain_data(every)) and 0 < each < inf):
         raise fault_of(refusal(every, "a finite number > 0"), "every")
     chosen = choose(config, at, samples)
-    stops = stop_when_settled or chosen.integrator.t_end >= FOREVER
-    chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_when_settled": stops}))
+    stops = stop_early or chosen.integrator.t_end >= FOREVER
+    chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_early": stops}))
     with blamed(chosen.origin):
         found = _followed(chosen, every, reporter or Reporter())
     if not samples or not load_config(config).distributions.keys() - at.keys():
@@ -231,7 +231,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     method = METHODS.get(config.integrator.method)
     # A fixed step meant for another method may be unstable with dopri5.
     other = {} if method and method.takes_every_step else {"method": PLAIN, "step": "auto"}
-    config = replace(config, integrator=config.integrator.patient.model_copy(update=other))
+    config = replace(config, integrator=config.integrator.in_one_leg.model_copy(update=other))
     dataset.check_names(config, SERIES)
     wanted = _numbers(config, at)
     drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}

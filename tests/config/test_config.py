@@ -37,7 +37,7 @@ def test_defaults_are_the_papers_standard_case(write: Write) -> None:
         "mu": (60.0,), "b": (3.0,), "n0": (0.05,), "a": (10.0,), "c": (1.0,), "delta": (0.03,),
         "x0": (0.01,), "y0": (0.01,),
     }  # fmt: skip
-    assert (config.integrator.t_end, config.integrator.patience) == (1e6, 30_000)
+    assert (config.integrator.t_end, config.integrator.stop_early) == (1e6, 30_000)
     assert config.measure == ("reversals", "energy_error", "margin", "noise_limited", "resting_spin")
 
 
@@ -184,15 +184,15 @@ def test_the_paper_s_model_runs_what_it_knows(beyond: str, read: Read) -> None:
 
 
 def test_the_default_time_of_bodies_in_si(read: Read) -> None:
-    """The paper's 30000 sqrt(c/g), rounded up to hundreds of seconds: that of `patience` with viscous friction."""
+    """The paper's 30000 sqrt(c/g), rounded up to hundreds of seconds: that of `stop_early` with viscous friction."""
     config = read(stone(("integrator: {t_end: 5}\n", ""), ("c: 0.02", "c: [0.01, 0.02]")))
     assert config.integrator.t_end == 1400
     assert 1300 < 30_000 * np.sqrt(0.02 / 9.81) < 1400
     assert read(config.to_yaml()) == config
     foreseen = read("body: {offset: 0.1, c: 0.5}\nfriction: {mu: 6}").integrator
-    assert (foreseen.patience, foreseen.t_end) == (30_000, 1e6)
+    assert (foreseen.stop_early, foreseen.t_end) == (30_000, 1e6)
     toy = "units: SI\nbody: {a: 0.1, b: 0.03, c: 0.02, mass: 1, Ixx: 2e-4, Iyy: 1e-3, Izz: 1e-3}\nfriction: {mu: 30}\n"
     foreseen = read(toy + "start: {n0: 1, x0: 1e-3, y0: 1e-3}").integrator
-    assert (foreseen.patience, foreseen.t_end) == (1400, 45_200)
+    assert (foreseen.stop_early, foreseen.t_end) == (1400, 45_200)
     assert 45_100 < 1e6 * np.sqrt(0.02 / 9.81) < 45_200
     assert read(STONE).integrator.t_end == 5

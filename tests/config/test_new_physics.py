@@ -80,7 +80,7 @@ import sweep
 
 def run(**settings):
     scene = {"model": "averaged", "friction": {"mu": 20}, "start": {"n0": 0.1}, "measure": []}
-    found = sweep.run(scene, t_end=400, stop_when_settled=False, **settings)
+    found = sweep.run(scene, t_end=400, stop_early=False, **settings)
     return float(found.spin_final), float(found.step)
 
 exact, _ = run(method="dopri5", step=0.02)

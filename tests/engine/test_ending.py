@@ -52,7 +52,7 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
     assert list(found.reversals) == [1, 3]
     assert list(found.decided) == [1, 1]
     paper = {"name": "one", "friction": {"mu": 60.0}}
-    ends = [sweep.trajectory(paper, **cell, stop_when_settled=True, t_end=600.0) for cell in cells]
+    ends = [sweep.trajectory(paper, **cell, stop_early=True, t_end=600.0) for cell in cells]
     assert [int(each.reversals[0]) for each in ends] == [1, 3]
     begun = sweep.trajectory(paper, **cells[0], t_end=20.0)  # where the bound on its energy would let it settle
     assert (int(begun.reversals[0]), int(begun.status[0])) == (0, TIME_LIMIT)
@@ -104,7 +104,7 @@ def test_settled_trajectories_stay_where_they_are_said_to() -> None:
     settings: dict[str, Any] = {"b": [2.0, 3.0], "mu": [40, 70], "n0": 0.05, "x0": 0.01, "y0": 0.01}
     settings |= {"t_end": 30_000, "method": "adams", "measure": list(default_measures("slip"))}
     quick = ROOT / "configs" / "quick.yaml"
-    left, later = (sweep.run(quick, **settings, stop_when_settled=stops) for stops in (True, False))
+    left, later = (sweep.run(quick, **settings, stop_early=stops) for stops in (True, False))
     settled = (left.status == SETTLED).values
     rest, end = left.spin_rest.values, later.spin_final.values
     # Beyond n_c1 a rattle grows, and turns the spin back, before it decays.
@@ -120,7 +120,7 @@ def test_what_is_left_of_a_rattle_may_turn_a_spin_that_a_couple_slows() -> None:
     """It settled at t = 26, and its spin reverses at t = 2175.  A weak couple does not keep a cell from settling."""
     body = {"a": 2.34302, "b": 1.04662, "delta": -0.01263}
     scene = {"body": body, "friction": {"mu": 750.3, "sigma": 0.01134}, "start": {"x0": 0.02637, "y0": 0.01432}}
-    swept, whole = (sweep.run(scene, n0=-0.06944, t_end=3000.0, stop_when_settled=ends) for ends in (True, False))
+    swept, whole = (sweep.run(scene, n0=-0.06944, t_end=3000.0, stop_early=ends) for ends in (True, False))
     assert (int(swept.reversals), int(whole.reversals), int(swept.decided)) == (1, 1, 0)
     weak = sweep.run({"friction": {"mu": 60, "sigma": 1e-4}, "start": {"n0": 0.02}})
     assert (int(weak.status), int(weak.decided)) == (SETTLED, 1)
@@ -129,7 +129,7 @@ def test_what_is_left_of_a_rattle_may_turn_a_spin_that_a_couple_slows() -> None:
 def test_the_end_of_a_rattle_that_outlasts_the_spin_is_foreseen() -> None:
     """The couple takes the spin within a hundred units of time, and the rattle decays in thousands."""
     scene = {"friction": {"mu": 120, "sigma": 0.1}, "body": {"b": [2.0, 3.0, 5.0, 8.0]}, "start": {"n0": 0.05}}
-    found, later = sweep.run(scene), sweep.run(scene, stop_when_settled=False, t_end=1e5)
+    found, later = sweep.run(scene), sweep.run(scene, stop_early=False, t_end=1e5)
     assert (found.decided == 1).all()
     np.testing.assert_array_equal(found.reversals, later.reversals)
     assert (abs(found.spin_final) < 1e-3 * 0.05).all()
@@ -151,7 +151,7 @@ def test_no_count_of_a_body_that_a_couple_slows_is_decided_too_early() -> None:
         "y0": random.uniform(-0.03, 0.03, size),
     }  # fmt: skip
     scene = {"cases": {name: values.tolist() for name, values in cells.items()}}
-    swept, whole = sweep.run(scene, t_end=10_000.0), sweep.run(scene, stop_when_settled=False, t_end=40_000.0)
+    swept, whole = sweep.run(scene, t_end=10_000.0), sweep.run(scene, stop_early=False, t_end=40_000.0)
     decided = swept.decided == 1
     assert int(decided.sum()) > 80
     assert (swept.reversals == whole.reversals).values[decided].all()

@@ -39,7 +39,7 @@ SPINS = np.array(
 """Spins of `BODY` and `WIDE` at t = 400, by SciPy's DOP853: `support.adaptive.spin`, half a minute of work."""
 
 
-cells = partial(run_cells, t_end=400.0, stop_when_settled=False)
+cells = partial(run_cells, t_end=400.0, stop_early=False)
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
         assert float(repeated.spin_error[0]) < 1e-8
         assert int(repeated.step_rule[0]) == REPEAT
-    settings = {"method": "adams", "t_end": 400.0, "stop_when_settled": False}
+    settings = {"method": "adams", "t_end": 400.0, "stop_early": False}
     once = sweep.run(
         replace(sweep.load_config({"cases": {n: [v] for n, v in (STANDARD | BODY).items()}}, settings), repeats=False)
     )

@@ -212,7 +212,7 @@ def test_300_wide_cells_end_as_they_truly_do(method: str) -> None:
     rows = np.genfromtxt(ROOT / "data" / "reference_wide.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     bodies = [{name: row[name] for name in STANDARD} for row in rows]
     # Failures are decided before errors are estimated, which takes dopri5 minutes at strong friction.
-    found = run_cells(bodies, method=method, t_end=400.0, stop_when_settled=False, estimate_errors=method == "adams")
+    found = run_cells(bodies, method=method, t_end=400.0, stop_early=False, estimate_errors=method == "adams")
     ends = {"time_limit": TIME_LIMIT, "toppled": TOPPLED}
     np.testing.assert_array_equal(found.status, [ends[end] for end in rows["end"]])
     np.testing.assert_allclose(found.t_stop, rows["t_end"], rtol=0, atol=2e-6)

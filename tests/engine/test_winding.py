@@ -57,10 +57,10 @@ def test_upright_spin_has_nothing_to_lose() -> None:
     np.testing.assert_allclose(total, spin**2)
 
 
-@pytest.mark.parametrize("patience", [500.0, 950.0, 2000.0])
-def test_no_run_goes_beyond_its_end(patience: float) -> None:
+@pytest.mark.parametrize("stop_early", [500.0, 950.0, 2000.0])
+def test_no_run_goes_beyond_its_end(stop_early: float) -> None:
     """The rattles of the first two wind down slowly; t_end comes before it is known how."""
-    found = run_cells([{"b": 9.7}, {"b": 9.9}, {"b": 3.0}], t_end=1000.0, patience=patience)
+    found = run_cells([{"b": 9.7}, {"b": 9.9}, {"b": 3.0}], t_end=1000.0, stop_early=stop_early)
     assert (found.t_stop <= 1000.0).all()
 
 
@@ -73,7 +73,7 @@ def test_what_has_wound_down_reverses_no_more() -> None:
     cells["b"] = cells["a"] * cells.pop("roundness")
     scene = {"name": "fresh", "cases": cells, "start": {"x0": 0.01, "y0": 0.01}, "integrator": {"method": "adams"}}
     found = sweep.run(scene, estimate_errors=False)
-    far = sweep.run(scene, estimate_errors=False, stop_when_settled=False, t_end=1e6)
+    far = sweep.run(scene, estimate_errors=False, stop_early=False, t_end=1e6)
     settled = (found.status == SETTLED).values
     assert settled.mean() > 0.9
     assert (found.t_stop.values[settled] < 20_000).sum() > 3

@@ -51,7 +51,7 @@ class Heard(Job):
 def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
     """A spin below 1.5 n_c1 settles within a few units of time, and is seen nevertheless."""
     cell = {**setup.base, "mu": 75.0, "b": 3.0, "n0": -0.006}
-    assert sweep.trajectory(setup.config, **cell, stop_when_settled=True)["t_stop"].item() < 10
+    assert sweep.trajectory(setup.config, **cell, stop_early=True)["t_stop"].item() < 10
     assert whole(setup, cell).dataset["time"][-1] == setup.config.integrator.t_end
 
 

@@ -123,7 +123,7 @@ def test_integrable_motion_has_none_within_the_bound_of_its_length(write: Write)
     """
     text = "model: averaged\nfriction: {mu: 1.0e+11}\nstart: {n0: [0.05, 0.1], x0: 0.3, y0: 0.3}\nmeasure: [lyapunov]\n"
     for t_end in (4000.0, 32000.0):
-        found = sweep.run(write(text), t_end=t_end, stop_when_settled=False)
+        found = sweep.run(write(text), t_end=t_end, stop_early=False)
         assert (np.abs(found.lyapunov) < (np.log(2) + np.log(20)) / (t_end / 2)).all()
 
 

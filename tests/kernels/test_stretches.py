@@ -83,7 +83,7 @@ def test_a_couple_slows_the_spin_of_a_body_that_hardly_rattles() -> None:
     """As an exponential of time, without leaps at a constant spin."""
     friction = {"mu": 60, "sigma": 1e-4}
     scene = {"body": {"b": 3.0}, "friction": friction, "start": {"n0": 0.002, "x0": 1e-9, "y0": 1e-9}}
-    found = sweep.run(scene, method="adams", t_end=20_000, stop_when_settled=False)
+    found = sweep.run(scene, method="adams", t_end=20_000, stop_early=False)
     assert float(found.spin_final) == pytest.approx(0.002 * np.exp(-1e-4 * 20_000 / ((10**2 + 3**2) / 5)), rel=1e-9)
     assert MODES not in find("slip+viscous+sigma").offers
 

@@ -87,7 +87,7 @@ def test_the_stiff_method_takes_any_body_with_viscous_friction() -> None:
     scene = IN_SI | {
         "friction": {"mu": [20, 1000], "sigma": 1e-4}, "measure": ["reversals", "energy_error"],
         "start": {"roll": "0.5 deg", "pitch": "1 deg", "omega3": [-5, 5], "slip1": 0.01},
-        "integrator": {"t_end": 1.5, "stop_when_settled": False},
+        "integrator": {"t_end": 1.5, "stop_early": False},
     }  # fmt: skip
     stiff, plain, chosen = (sweep.run(scene, **method) for method in ({"method": "adams"}, {"method": "dopri5"}, {}))
     told, apart = stiff["spin_error"] + plain["spin_error"], abs(stiff["spin_final"] - plain["spin_final"])

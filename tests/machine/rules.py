@@ -251,7 +251,7 @@ class Machine(RuleBasedStateMachine):
     def in_si(self) -> None:
         """A body of any size, in SI, does so too."""
         old, unit = self.config.integrator, oracles.TIME
-        times = {"t_end": old.t_end * unit, "patience": old.patience and old.patience * unit}
+        times = {"t_end": old.t_end * unit, "stop_early": old.first_leg * unit if old.first_leg else old.stop_early}
         times |= {} if old.step == "auto" else {"step": old.step * unit}
         fixed = {"units": "SI", "gravity": oracles.LENGTH / unit**2, "body.mass": oracles.MASS}
         more = {f"integrator.{key}": value for key, value in times.items()} | fixed
@@ -294,10 +294,8 @@ class Machine(RuleBasedStateMachine):
             with pytest.raises(InputError):
                 sweep.trajectory(scene, **values)
         elif oracles.simulated(self.found)[cell[0]]:
-            followed = self.ask(
-                "follow", lambda: sweep.trajectory(scene, stop_when_settled=True, every=every, **values)
-            )
-            if followed is not None and config.integrator.stop_when_settled:
+            followed = self.ask("follow", lambda: sweep.trajectory(scene, stop_early=True, every=every, **values))
+            if followed is not None and config.integrator.settles:
                 oracles.alike(oracles.rows(followed), oracles.rows(self.found, cell))
 
     @rule(given=draws.draws(range(20), 6, 1), number=NUMBER)
@@ -333,7 +331,7 @@ class Machine(RuleBasedStateMachine):
         more: Flat = {
             "name": "x",
             "integrator.t_end": config.integrator.t_end,
-            "integrator.patience": config.integrator.patience,
+            "integrator.stop_early": config.integrator.stop_early,
         }
         few = {**more}
         if "t_end" in ways:

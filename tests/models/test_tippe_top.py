@@ -47,7 +47,7 @@ def at_start(p: dict[str, float]) -> np.ndarray:
 )
 def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
     top = TOP | more
-    asked = {**top, "t_end": 15, "stop_when_settled": False}
+    asked = {**top, "t_end": 15, "stop_early": False}
     one = sweep.trajectory(CONFIG, tolerance=1e-12, every=1.0, **asked).isel(trajectory=0)
     start, times = at_start(top), one["time"].values
     y = solve_ivp(lambda _, y: slopes(y, top), (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
@@ -57,7 +57,7 @@ def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
 
 
 def test_it_turns_over_while_energy_balances_and_jelletts_integral_stays() -> None:
-    one = sweep.trajectory(CONFIG, t_end=100, stop_when_settled=False, **TOP).isel(trajectory=0)
+    one = sweep.trajectory(CONFIG, t_end=100, stop_early=False, **TOP).isel(trajectory=0)
     assert one["inclination"].min() < 0.2
     assert one["inclination"].max() > 3.0
     assert int(one["reversals"]) == 1
@@ -73,7 +73,7 @@ def test_it_turns_over_while_energy_balances_and_jelletts_integral_stays() -> No
 def test_it_turns_over_completely_if_its_moments_are_in_the_published_range() -> None:
     """1 - α < A/C < 1 + α; below it does not turn over, above not completely."""
     tops = {**TOP, "mu": 1.0, "ratio": [0.6, 0.9, 1.1, 1.5]}
-    ends = sweep.run(CONFIG, t_end=2000, stop_when_settled=False, **tops)
+    ends = sweep.run(CONFIG, t_end=2000, stop_early=False, **tops)
     alpha, ratio = TOP["eccentricity"], ends["ratio"]
     upside_down = -TOP["n0"] * (np.cos(TOP["tilt"]) - alpha) / (1 + alpha)
     np.testing.assert_array_equal(
@@ -103,7 +103,7 @@ def test_no_settled_top_reverses_later() -> None:
 
 
 def test_the_automatic_step_keeps_the_tolerance() -> None:
-    asked = {**TOP, "n0": [2.0, 6.0], "eccentricity": [0.1, 0.3], "t_end": 100, "stop_when_settled": False}
+    asked = {**TOP, "n0": [2.0, 6.0], "eccentricity": [0.1, 0.3], "t_end": 100, "stop_early": False}
     exact = sweep.run(CONFIG, tolerance=1e-13, **asked)["spin_final"]
     for tolerance in (1e-6, 1e-8, 1e-10):
         found = sweep.run(CONFIG, tolerance=tolerance, **asked)["spin_final"]

@@ -104,7 +104,7 @@ def test_a_cell_on_the_boundary_itself_is_on_one_of_its_sides() -> None:
 
 def test_margins_are_those_of_cells_that_settle() -> None:
     settings: dict[str, Any] = {"bracket": 1e-3, "progress": False, "mu": [60.0, 72.0], "b": [3.0, 4.0]}
-    usual, endless = (sweep.boundaries(SCENE, stop_when_settled=stops, **settings) for stops in (True, False))
+    usual, endless = (sweep.boundaries(SCENE, stop_early=stops, **settings) for stops in (True, False))
     same_numbers(endless, usual)
 
 

@@ -115,7 +115,7 @@ def test_an_interrupted_trajectory_says_so(runs: Runs) -> None:
             seen.append(time.monotonic())
         return bool(seen) and seen[-1] > seen[0] + 0.5
 
-    endless = ("--at", "mu=100", "--set", "t_end=1e6", "--set", "stop_when_settled=false")
+    endless = ("--at", "mu=100", "--set", "t_end=1e6", "--set", "stop_early=false")
     process = runs.strike(at_work, signal.SIGINT, *endless)
     assert process.exitcode == 130
     assert process.log.read_text().splitlines()[-1] == "interrupted"

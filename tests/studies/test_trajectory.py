@@ -79,7 +79,7 @@ STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\
 
 def test_sampling_does_not_touch_the_steps(write: Write) -> None:
     swept = sweep.run(write(STANDARD), method="dopri5")
-    followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0, stop_when_settled=True)
+    followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0, stop_early=True)
     np.testing.assert_array_equal(followed.spin_final, swept.spin_final)
     np.testing.assert_array_equal(followed.energy_error, swept.energy_error)
     for i in range(2):
@@ -155,7 +155,7 @@ def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
 
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
     config = sweep.load_config(write(STANDARD), {"t_end": 8000.0})
-    both = sweep.trajectory(config, mu=60, n0=[0.001, 0.05], every=5.0, stop_when_settled=True)
+    both = sweep.trajectory(config, mu=60, n0=[0.001, 0.05], every=5.0, stop_early=True)
     assert both.t_stop[0] < both.t_stop[1] - 5
     for i in range(2):
         np.testing.assert_array_equal(np.isfinite(both.spin[i]), both.time <= both.t_stop[i] * (1 + 1e-12))

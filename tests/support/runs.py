@@ -64,7 +64,7 @@ def in_sittings(chunks: int, config: Any, output: Path) -> tuple[xr.Dataset, int
 
 def settled(scene: Any, share: float, **settings: Any) -> tuple[xr.Dataset, xr.Dataset, np.ndarray]:
     """A run, the same one without an early end, and which cells have settled: they have had their last reversal."""
-    ended, gone_on = (sweep.run(scene, **settings, stop_when_settled=stops) for stops in (True, False))
+    ended, gone_on = (sweep.run(scene, **settings, stop_early=stops) for stops in (True, False))
     which = ended["status"].values == SETTLED
     assert which.mean() >= share
     np.testing.assert_array_equal(ended["reversals"].values[which], gone_on["reversals"].values[which])

@@ -33,7 +33,7 @@ and the number of further windows that it takes to decay at this rate, 0 if its 
 
 LOOKS = 256
 """Looks in a window, less one.  Of the roundest bodies of `mu_b` a rattle loses 0.03 % of its energy in a tenth of the
-patience, so that a few looks could not distinguish this from the ripple of M·u/J33, which is 3e-6."""
+first leg, so that a few looks could not distinguish this from the ripple of M·u/J33, which is 3e-6."""
 
 STEEPER = 8.0
 """The slope of M·u/J33 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
