@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from sweep.meaning import INLINED, Unknown, meaning
 from sweep.sources import hashed, versions
 
 # contract: fuse a*b + c into one FMA.  nsz, arcp: harmless on the values met here.
@@ -37,6 +38,9 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FASTMATH}
 _WIDEST = 512
 
 _NUMERIC_SOURCES = ("jit.py", "models/**/*.py", "kernels/**/*.py")
+
+_KEPT = 10
+"""Number of versions of a compiled function that the cache on disk keeps, each in two files."""
 
 _waiting: list[tuple[Callable[..., Any], bool]] = []
 """Functions that Numba does not know yet, because it is not imported, and whether they are inlined."""
@@ -89,6 +93,7 @@ def called(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _marked(function: Callable[..., Any], inlined: bool) -> Callable[..., Any]:
+    setattr(function, INLINED, inlined)
     if load_numba.cache_info().currsize:
         _register(function, inlined)
     else:
@@ -208,11 +213,20 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
-def fingerprint() -> str:
-    """Hash of all sources from which a kernel can be built, and of the versions of what compiles them."""
-    files = [path for pattern in _NUMERIC_SOURCES for path in Path(__file__).parent.glob(pattern)]
-    decisive = f"{hashed(files)} {versions()} {INTERPRETED}"
-    return hashlib.sha256(decisive.encode()).hexdigest()[:16]
+def fingerprint(function: Callable[..., Any]) -> str:
+    """Return a hash of all that decides the machine code of a function: what it means, and what compiles it.
+
+    If it depends on something of unknown meaning, the sources of all numeric code count.
+    """
+    try:
+        means = meaning(function)
+    except Unknown:
+        means = hashed(path for pattern in _NUMERIC_SOURCES for path in Path(__file__).parent.glob(pattern))
+    return _short(f"{means} {hashed([Path(__file__)])} {versions()}")
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 _FILE = re.compile(r'File "(.+?)", line (\d+)')
@@ -259,8 +273,9 @@ class Cached:
 
     Numba's own cache depends on the file that defines a function and on the function's closure.  Here the closure
     holds compiled functions from other files.  Numba takes these for new ones in every process, so its cache would
-    never hit, and it does not notice when those files are edited.  The key used instead consists of the
-    specialisation and of the hash of all numeric sources and of the libraries that compile them.
+    never hit, and it does not notice when those files are edited.  The name of a file of this cache consists instead of
+    the specialisation and of the `fingerprint`, so that an edit of a comment, or of what the function does not use,
+    compiles nothing, and two branches keep their code side by side.
     """
 
     def __init__(self, dispatcher: Any, types: str, specialisation: str) -> None:
@@ -268,7 +283,7 @@ class Cached:
         if INTERPRETED:  # Numba has returned the function as it was
             return
         with suppress(RuntimeError):  # Numba finds no folder to write to: each process compiles for itself
-            self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation, fingerprint())
+            self._cache = dispatcher._cache = _disk_cache()(dispatcher.py_func, specialisation)
 
     def __call__(self, *arguments: Any) -> None:
         if not self.is_ready():
@@ -307,13 +322,12 @@ def _disk_cache() -> Any:
     from numba.core.registry import cpu_target
 
     class DiskCache(FunctionCache):
-        def __init__(self, function: Callable[..., Any], specialisation: str, sources: str) -> None:
+        def __init__(self, function: Callable[..., Any], specialisation: str) -> None:
             super().__init__(function)  # type: ignore[no-untyped-call]
             # Each specialisation has files of its own: processes that compile two of them at the same time would
-            # otherwise write to one index, and could give the code of one the name of the other.  Another hash of
-            # the sources makes what the files hold obsolete.
-            name = f"{self._impl.filename_base}-{hashlib.sha256(specialisation.encode()).hexdigest()[:16]}"
-            self._cache_file = IndexDataCacheFile(self.cache_path, name, sources)
+            # otherwise write to one index, and could give the code of one the name of the other.
+            self._name = f"{self._impl.filename_base}-{_short(specialisation)}"
+            self._cache_file = IndexDataCacheFile(self.cache_path, f"{self._name}-{fingerprint(function)}", "")
 
         def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
             return (sig, codegen.magic_tuple(), vector_bits())
@@ -328,5 +342,11 @@ def _disk_cache() -> Any:
         def save_overload(self, sig: Any, data: Any) -> None:
             with suppress(OSError):  # such as a full disk: the code in memory runs all the same
                 super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+                self._discard_oldest()
+
+        def _discard_oldest(self) -> None:
+            saved = sorted(Path(self.cache_path).glob(f"{self._name}-*"), key=lambda file: -file.stat().st_mtime)
+            for file in saved[2 * _KEPT :]:
+                file.unlink(missing_ok=True)
 
     return DiskCache

@@ -8,8 +8,6 @@ import pytest
 from support import ROOT
 from support.processes import python
 
-from sweep import jit
-
 # The averaged model: its kernel compiles fastest.
 SCRIPT = """
 import sys
@@ -54,29 +52,26 @@ def test_kernels_are_found_again_kept_apart_and_compiled_anew_after_an_edit(copy
     assert process(copy, "", "reversals") == [("found", nothing), ("found", reversals)]
     assert process(copy, "reversals", "") == [("found", reversals), ("found", nothing)]
 
+    # A comment, a docstring, and the code of a measurement that is not in the kernel.
+    measures = copy / "sweep" / "kernels" / "measures"
+    edit(measures / "reversals.py", "from __future__", "# A comment.\nfrom __future__")
+    edit(measures / "margin.py", "@inline", "@called")
+    edit(measures / "margin.py", "import inline", "import called, inline")
+    assert process(copy, "", "reversals") == [("found", nothing), ("found", reversals)]
+
     # An edit of another file than the kernel's, of the same length, its times kept.
     edit(copy / "sweep" / "models" / "ladder" / "averaged.py", "p.half_m4 + n", "p.half_m4 - n")
     ((how, changed),) = process(copy, "")
     assert how == "compiled"
     assert changed != nothing
 
+    # Both versions stay.
+    edit(copy / "sweep" / "models" / "ladder" / "averaged.py", "p.half_m4 - n", "p.half_m4 + n")
+    assert process(copy, "") == [("found", nothing)]
+
 
 def edit(file: Path, old: str, new: str) -> None:
     times, text = file.stat(), file.read_text(encoding="utf-8")
     assert old in text
-    assert len(old) == len(new)
     file.write_text(text.replace(old, new, 1), encoding="utf-8")
     os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
-
-
-def test_the_fingerprint_is_of_every_numeric_source_and_no_other(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "__file__", str(copy / "sweep" / "jit.py"))
-    fingerprints = [jit.fingerprint()]
-    numeric = [path for room in ("jit.py", "models/**/*.py", "kernels/**/*.py") for path in (copy / "sweep").glob(room)]
-    assert {"slip.py", "step.py", "jit.py"} < {path.name for path in numeric}
-    others = [copy / "sweep" / name for name in ("config/schema.py", "plots/maps.py", "cli/runs.py")]
-    for path in (*numeric, *others):
-        with path.open("a", encoding="utf-8") as source:
-            source.write("# edited\n")
-        fingerprints.append(jit.fingerprint())
-    assert len(set(fingerprints)) == len(numeric) + 1
