@@ -49,7 +49,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     measure : the measurements to be predicted: the time of the first reversal if "first_reversal" is among them, and
         the count by the slow equations if "foreseen" is, or for their own model "reversals"
     """
-    found = formulas(tier, grid)
+    found = _formulas(tier, grid)
     if tier is slow.MODEL and Reversals.name in measure:
         found |= foreseen(slip.MODEL, grid.columns())
     if not isinstance(tier, Model):
@@ -121,7 +121,7 @@ def _in_parts(of: Callable[[Columns], Array], model: Model, columns: Columns, ro
     return found
 
 
-def formulas(tier: Tier, grid: Grid) -> dict[str, Array]:
+def _formulas(tier: Tier, grid: Grid) -> dict[str, Array]:
     """The variables that are predicted without eigenvalues: they cost next to nothing.
 
     The form factor is that of the paper's bodies.  The other formulas do not apply to a tier whose spin reverses for

@@ -158,7 +158,6 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         measure=tuple(measures.default(model) if values.measure is None else values.measure),
         max_failed_fraction=values.max_failed_fraction,
         picture=_pictures(values, source),
-        refine=values.refine,
         cases=columns,
         cases_file=values.cases,
         samples=samples,

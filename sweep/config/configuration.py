@@ -73,7 +73,6 @@ class Config:
     """Variables to draw, as `sweep.plots.quantities.field` takes them; empty for the first measured variables."""
     repeats: bool = True
     """Whether cells whose error exceeds the tolerance are run again with shorter steps."""
-    refine: int = 0
     cases: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Columns of the table of cases or of the samples, if there is one."""
     cases_file: str | None = None
@@ -228,7 +227,6 @@ class Config:
                 for name, _, n in (m.partition("=") for m in self.measure)
             ],
             **({"picture": list(self.picture)} if self.picture else {}),
-            "refine": self.refine,
             "max_failed_fraction": self.max_failed_fraction,
         }
 

@@ -55,8 +55,6 @@ def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
     """Check that values fit the model, the method and each other; `given` holds the values of all parameters."""
     yield from _of_parameters(config, given)
     yield from _of_integrator(config)
-    if config.refine:
-        yield from _of_refinement(config)
     for i, spec in enumerate(config.measure):
         yield from ((("measure", i), reason) for reason in _unmeasurable(spec.partition("=")[0], config))
 
@@ -73,9 +71,8 @@ def of_all_cells(config: Config) -> Iterator[Misfit]:
     cells = config.grid.size
     if cells > MAX_CELLS:
         yield (), f"{cells} cells are too many; keep to {MAX_CELLS}"
-    for name, way_out in (("refine", ", or set it to 0"), ("samples", " in all")):
-        if getattr(config, name) and cells > MAX_CELLS_IN_MEMORY:
-            yield (name,), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY}{way_out}"
+    if config.samples and cells > MAX_CELLS_IN_MEMORY:
+        yield ("samples",), f"cannot hold {cells} cells in memory; keep to {MAX_CELLS_IN_MEMORY} in all"
     checks = {("body",): impossible, ("start", "x0"): misplaced, ("integrator", "step"): _unusable_step}
     yield from ((path, reason) for path, check in checks.items() if (reason := check(config)))
 
@@ -122,15 +119,6 @@ def _of_integrator(config: Config) -> Iterator[Misfit]:
         yield ("integrator", "method"), f"cannot run the {model.name} model; choose {either(usable)}"
     if integrator.method == methods.AUTO and integrator.step != "auto":
         yield ("integrator", "step"), "must be auto with method: auto; or choose a method"
-
-
-def _of_refinement(config: Config) -> Iterator[Misfit]:
-    if not config.simulated:
-        yield ("refine",), f"needs a simulation, and the {config.model} model is not simulated; set it to 0"
-    if config.cases:
-        yield ("refine",), f"cannot be combined with {config.row}s, which have no neighbours; set it to 0"
-    if "reversals" not in config.measure:
-        yield ("measure",), "must have reversals, on which refine depends; add them, or set refine to 0"
 
 
 def _unmeasurable(name: str, config: Config) -> Iterator[str]:

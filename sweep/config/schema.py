@@ -85,7 +85,7 @@ LATEST = 1e12
 """Largest `t_end`, in sqrt(c/g)."""
 
 MAX_CELLS_IN_MEMORY = 2**24
-"""Most cells of a sampled or refined run, which holds all its arrays in memory."""
+"""Most cells of a sampled run, which holds all its arrays in memory."""
 
 
 def _in_si(raw: Any) -> Any:
@@ -234,11 +234,6 @@ class _Top(Strict):
         description=f"number of samples to draw from the distributions; by default {SAMPLES} if there are any",
     )  # fmt: skip
     seed: Whole = Field(default=0, ge=0, lt=2**32, description="seed of the samples, which makes them reproducible")
-    refine: Whole = Field(
-        default=0, ge=0, le=MAX_CELLS_IN_MEMORY.bit_length() - 1,
-        description="every 2^refine-th value of each range is simulated first, then the cells near changes of the "
-        "count; 0 simulates every cell",
-    )  # fmt: skip
     max_failed_fraction: float = Field(
         default=0.01, ge=0, le=1, description="fraction of failed cells above which the command exits with code 3"
     )

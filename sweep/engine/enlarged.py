@@ -1,9 +1,9 @@
-"""Reuses the results of an earlier run from its dataset, and simulates the rest."""
+"""Reuse the results of an earlier run from its dataset, and simulate the rest."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from sweep.config import Config
 from sweep.config.document import parse_value
 from sweep.ended import without_ended
 from sweep.engine.plan import choose
-from sweep.engine.whole import Some
+from sweep.engine.whole import Whole
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures import MEASURES
@@ -22,7 +22,7 @@ from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, TIME_LIMIT
 from sweep.models.model import Model
 from sweep.parameters import Parameter, sections
-from sweep.results import dataset
+from sweep.results import dataset, netcdf
 from sweep.results.dataset import ROWS
 from sweep.results.netcdf import open_dataset
 from sweep.results.provenance import Identity, identify
@@ -88,7 +88,7 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
         changed = {key for key in changed if not key.startswith("integrator.")}
     grown, size = _match(config.grid, _grid(there)), there["status"].size
     smaller = len(grown) != size if rerun else new["integrator.t_end"] < old["integrator.t_end"]
-    if changed or less or smaller or config.refine or (grown >= 0).sum() < size:
+    if changed or less or smaller or (grown >= 0).sum() < size:
         return found.difference(wanted) or edited
     return ""
 
@@ -102,7 +102,7 @@ def _is_edited(config: Config, there: xr.Dataset) -> bool:
     measured = {spec.partition("=")[0] for spec in str(there.attrs.get("measured", "")).split()}
     kinds = [MEASURES[each] for each in measured & MEASURES.keys()]
     needed = {"spin_final", "t_stop", "step", *(name for kind in kinds for name in kind.variables)}
-    lacking = config.simulated and "inferred" not in there and not needed <= set(there.data_vars)
+    lacking = config.simulated and not needed <= set(there.data_vars)
     if lacking or "measured" not in there.attrs:
         return True
     written = dataset.layout(grid, set(map(str, there.data_vars)))
@@ -192,16 +192,29 @@ def _match(grid: Grid, there: Grid) -> Array:
     return np.asarray(at[which[len(known) :]])
 
 
-class Enlarged(Some):
-    """The cells that an earlier run lacks, and the dataset that combines these with the earlier run."""
+class Enlarged(Whole):
+    """The cells that an earlier run lacks, as a table of cases, and the dataset that combines both."""
 
     def __init__(self, config: Config, store: Store, earlier: Earlier) -> None:
         super().__init__(config, store)
         self.earlier = earlier
+        self.cells = np.flatnonzero(earlier.cells < 0)
+        """Indices of the simulated cells, in the order of the table."""
 
     def grow(self) -> bool:
         """Add the tiles to simulate: all of them, once. Return False if there are no more."""
-        return not self.tiles and self._add(np.flatnonzero(self.earlier.cells < 0))
+        return not self.tiles and self._cut(len(self.cells))
+
+    def simulated(self) -> Config:
+        """Return the configuration whose cases are the simulated cells, which `tiles` cover."""
+        table = self.grid.take(self.cells)
+        constants = {name: self.config.parameters[name] for name in table.constants}
+        cases = {name: tuple(values.tolist()) for name, values in table.table.items()}
+        return replace(self.config, parameters=constants, cases=cases, samples=None)
+
+    def save(self, path: Path) -> None:
+        """Write the labelled dataset, which has to fit into memory."""
+        netcdf.write(path, self.dataset())
 
     def dataset(self) -> xr.Dataset:
         """Return the labelled dataset over all cells, in memory."""
@@ -213,3 +226,12 @@ class Enlarged(Some):
             words["taken_over"] = self.earlier.words
         words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
         return dataset.label(self.config, self.grid, arrays, words)
+
+    def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:
+        """Write `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""
+        _, body = self.grid.bodies()
+        for name, (over, spec) in dataset.layout(self.grid, found).items():
+            if name not in arrays:
+                nothing = np.nan if spec.dtype.startswith("float") else 0
+                arrays[name] = np.full((over.size, *found[name].shape[1:]), nothing, spec.dtype)
+            arrays[name][body[cells] if spec.per_body else cells] = found[name]

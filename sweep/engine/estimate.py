@@ -37,7 +37,6 @@ def estimate(config: Config) -> str:
     grid = config.grid
     axes = " × ".join(f"{d} {n}" for d, n in zip(grid.dims, grid.shape, strict=True))
     cells = f"cells:  {grid.size}{f' ({axes})' if axes else ''}"
-    cells += ", not all of them simulated" if config.refine else ""
     if not config.simulated:
         return cells
     sample = grid.sample(_SAMPLE)

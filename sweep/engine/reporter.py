@@ -16,7 +16,7 @@ class Progress:
     """The progress of a run."""
 
     cells: float
-    """Cells to simulate in total, as far as known: a refined run adds more with each pass."""
+    """Cells to simulate in total, as far as known: a search adds more with each round."""
     done: float
     """Finished cells; a fraction where parts of a cell count, as in a search."""
     failed: int

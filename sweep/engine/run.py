@@ -2,9 +2,8 @@
 
 The configuration defines the grid of cells, and the grid is cut into tiles.  For each tile `engine.plan` chooses model,
 kernel and steps, and `engine.executor` advances its trajectories to their ends: in this process (`engine.local`) or in
-others (`engine.cluster`).  A store keeps the finished tiles.  `engine.whole` or, where only some cells are simulated,
-`engine.refined` assembles the dataset, and `plots` draws its maps. `engine.enlarged` reuses the results of an earlier
-run.
+others (`engine.cluster`).  A store keeps the finished tiles.  `engine.whole` assembles the dataset, or
+`engine.enlarged`, which reuses the results of an earlier run, and `plots` draws its maps.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from sweep.config import Config, ConfigLike, InputError, load_config
 from sweep.engine import local
 from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
-from sweep.engine.refined import Refined
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
 from sweep.faults import FileError, fault_of
@@ -61,8 +59,6 @@ def run(
         raise FileError("--rerun: it needs the dataset that --fresh discards; leave out one of the two")
     if rerun and output is None:
         raise FileError("rerun: it needs output, the folder of the run whose cells are to be simulated again")
-    if rerun and config.refine:
-        raise FileError("--rerun: single cells of a refined run cannot be simulated again; start anew with --fresh")
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config).again(rerun)
@@ -136,8 +132,7 @@ def _compute(
         reporter.note(earlier.words)
         result: Whole = Enlarged(config, store, earlier)
     else:
-        # A single cell has no neighbours from which it could be inferred.
-        result = Refined(config, store) if config.refine and config.axes else Whole(config, store)
+        result = Whole(config, store)
     carry_out(result, store, reporter, client)
     return result
 

@@ -1,9 +1,8 @@
-"""Runs all cells or some of them, and makes the dataset from the finished tiles."""
+"""Run all cells of a configuration, and make the dataset from the finished tiles."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,40 +85,3 @@ class Whole:
         costs = [(float(tile["seconds"]), str(tile["cpu"])) for _, tile in self._finished()]
         seconds, cpus = sum(seconds for seconds, _ in costs), {cpu for _, cpu in costs}
         return provenance(self.config, seconds, cells, cpus) | described_impossible(self.config)
-
-
-class Some(Whole):
-    """Some cells of a configuration as a growing table of cases; the rest come from an earlier run or by inference.
-
-    A table of cases has no neighbours, so it is not refined.
-    """
-
-    def __init__(self, config: Config, store: Store) -> None:
-        super().__init__(config, store)
-        self.cells: Array = np.empty(0, np.intp)
-        """Indices of the simulated cells, in the order of the table."""
-
-    def simulated(self) -> Config:
-        """The configuration whose cases are the simulated cells, which `tiles` cover."""
-        table = self.grid.take(self.cells)
-        constants = {name: self.config.parameters[name] for name in table.constants}
-        cases = {name: tuple(values.tolist()) for name, values in table.table.items()}
-        return replace(self.config, refine=0, parameters=constants, cases=cases, samples=None)
-
-    def save(self, path: Path) -> None:
-        """Write the labelled dataset, which has to fit into memory."""
-        netcdf.write(path, self.dataset())
-
-    def _add(self, cells: Array) -> bool:
-        """Simulate these cells too, in separate tiles; return False if there are none."""
-        self.cells = np.concatenate([self.cells, cells])
-        return self._cut(len(cells))
-
-    def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:
-        """Write `found` for `cells`, as cases, into `arrays` over all cells or bodies, undefined elsewhere."""
-        _, body = self.grid.bodies()
-        for name, (over, spec) in dataset.layout(self.grid, found).items():
-            if name not in arrays:
-                nothing = np.nan if spec.dtype.startswith("float") else 0
-                arrays[name] = np.full((over.size, *found[name].shape[1:]), nothing, spec.dtype)
-            arrays[name][body[cells] if spec.per_body else cells] = found[name]

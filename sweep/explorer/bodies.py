@@ -150,5 +150,5 @@ def _of_cells(config: Config, columns: Mapping[str, Array], axes: tuple[str, ...
     cases = {name: tuple(columns[name].tolist()) for name in axes}
     one = {name: Values.one(float(values[0])) for name, values in columns.items() if name not in axes}
     integrator = config.integrator.model_copy(update={"estimate_errors": False})
-    plain = replace(config, measure=measures.default(config.equations), picture=(), samples=None, refine=0)
+    plain = replace(config, measure=measures.default(config.equations), picture=(), samples=None)
     return replace(plain, parameters=one, cases=cases, integrator=integrator)

@@ -128,7 +128,6 @@ TILES = {
     "impossible": _tile(6, lambda _, y: np.where(y == 0, _DARK, _LIGHT)),
     "no_value": _tile(1, lambda x, _: 0 * x + _LIGHT),
     "time_limit": _tile(10, lambda x, y: _lines((x + y) % 10)),
-    "inferred": _tile(6, lambda x, y: np.where(x < 2, _lines(y), 0)),
     "noise_limited": _tile(8, lambda _, y: _lines(y)),
 }
 assert [*TILES, "uncertain"] == list(marks.WORDS)  # drawn as a dot

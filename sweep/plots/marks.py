@@ -20,7 +20,6 @@ WORDS = {
     "impossible": "impossible body",
     "no_value": "no value",
     "time_limit": "lower bound: time limit",
-    "inferred": "inferred, not simulated",
     "noise_limited": "limited by round-off",
     "uncertain": "uncertain count",
 }
@@ -66,7 +65,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
             return none
         return none | dataset[variable].isin(values)
 
-    not_run, failed, inferred = among("status", 0), among("status", *FAILURES), among("inferred", 1)
+    not_run, failed = among("status", 0), among("status", *FAILURES)
     impossible, missing = among("status", IMPOSSIBLE), found.isnull()
     sound = ~(not_run | failed | impossible)
     settled_open = among("status", SETTLED) & among("decided", 0)
@@ -75,9 +74,8 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
         "not_run": not_run,
         "failed": failed,
         "impossible": impossible,
-        "no_value": missing & sound & ~inferred,
+        "no_value": missing & sound,
         "time_limit": among("status", TIME_LIMIT) & ~missing & limited,
-        "inferred": inferred,
         "noise_limited": among("noise_limited", 1) & sound,
         "uncertain": (among("sensitive", 1) | among("window_dependent", 1) | settled_open) & sound & grows,
     }
@@ -101,8 +99,6 @@ def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
         codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
-    if kind == "inferred" and field(dataset, name).dtype.kind == "f":
-        return "not simulated"
     return _PER_VARIABLE.get((name, kind), WORDS[kind])
 
 

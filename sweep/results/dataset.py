@@ -73,8 +73,6 @@ SIDES = {"plus": "⁺", "minus": "⁻"}
 VARIABLES: dict[str, Variable] = {
     **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
     "status": _flag("how the trajectory ended", STATUSES),
-    "inferred": _flag("how the count was found", {0: "simulated", 1: "inferred"},
-                      "How reversals and status were found."),
     "spin_final": Variable("float64", SPIN, "final spin n", "Spin at t_stop.", of_sound_runs=True),
     "spin_error": Variable("float64", SPIN, "estimated error of the final spin", of_sound_runs=True),
     "sensitive": _flag("is the count sensitive?", {0: "firm", 1: "sensitive"},

@@ -95,21 +95,21 @@ class Counts:
     def _count(self) -> Array:
         return np.where(self.known, self.reversals, 0).astype(int)
 
-    def distance(self, level: Any, cells: Any = ...) -> Array:
-        """Return the distance in spin of `cells` (by default all) from the boundary of `level` reversals.
+    def distance(self, level: Any) -> Array:
+        """Return the distance in spin of all cells from the boundary of `level` reversals.
 
         It is negative where the cells count fewer, and NaN where unknown. There is one level for all cells, or one for
         each. If the count of a cell is more than one away, or its spin comes no nearer to zero after its last arc, the
         distance is an estimate that takes the width of each count from other cells.
         """
-        count, below = self._count[cells], self._below
+        count, below = self._count, self._below
         of_level = np.interp(level, np.arange(below.size), below)
         found = np.where(
             count >= level,
-            self.fewer[cells] + (below[count] - of_level),
-            -(self._to_more[cells] + (of_level - below[np.minimum(count + 1, level)])),
+            self.fewer + (below[count] - of_level),
+            -(self._to_more + (of_level - below[np.minimum(count + 1, level)])),
         )
-        return np.where(self.known[cells], found, np.nan)
+        return np.where(self.known, found, np.nan)
 
     def borders(self, level: Any) -> Array:
         """Return whether the distance from the boundary of `level` reversals is measured, and not estimated."""

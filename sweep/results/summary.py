@@ -186,8 +186,6 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         yield "; ".join(doubts)
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
-    if "simulated_share" in dataset.attrs:
-        yield f"simulated: {dataset.attrs['simulated_share']:.1%} of the cells; the rest are inferred"
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
     if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():

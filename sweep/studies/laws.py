@@ -72,7 +72,7 @@ def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
     A coefficient of dry friction says nothing about a viscous one, and vice versa.
     """
     document, before = config.document(), LAWS[config.law]
-    kept = {key: document[key] for key in document if key not in ("integrator", "measure", "refine")}
+    kept = {key: document[key] for key in document if key not in ("integrator", "measure")}
     owned = {name for each in LAWS.values() for name in each.parameters}
     given = document.get("friction", {})
     friction = {name: value for name, value in given.items() if name not in {*owned, "law", "regularisation"}}

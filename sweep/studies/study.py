@@ -56,7 +56,7 @@ def measuring(config: Config) -> Config:
     usual = default(config.equations)
     measure = tuple(spec for spec in usual if spec in _NEEDED or spec in config.measure)
     integrator = config.integrator.model_copy(update={"stop_early": config.integrator.stop_early or True})
-    return replace(config, measure=measure, film=None, repeats=False, refine=0, integrator=integrator)
+    return replace(config, measure=measure, film=None, repeats=False, integrator=integrator)
 
 
 def require_certain(config: Config) -> None:

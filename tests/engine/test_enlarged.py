@@ -150,7 +150,6 @@ def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> Non
         (("t_end", "tolerance: 1e-6, t_end"), "tolerance: 1e-08"),
         (("delta: 0.03", "delta: 0.02"), "- delta: 0.03"),
         (("integrator", "measure: [reversals]\nintegrator"), "- measure:"),
-        (("integrator", "refine: 1\nintegrator"), "- refine: 0"),
     ],
 )
 def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str], said: str) -> None:
@@ -242,11 +241,9 @@ def test_rerun_of_no_cells_leaves_a_dataset_that_can_grow(write: Write, tmp_path
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == {"small.nc": before}
 
 
-def test_rerun_needs_a_dataset_that_was_not_refined(write: Write, tmp_path: Path) -> None:
+def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"^rerun: it needs output, the folder of the run"):
         sweep.run(write(ONE), rerun="failed")
-    with pytest.raises(FileError, match=r"^--rerun: single cells of a refined run cannot .*; start anew with --fresh"):
-        grown(write, tmp_path / "out", ONE, rerun="failed", refine=1, tolerance=1e-9)
     with pytest.raises(FileError, match="--rerun needs the dataset"):
         grown(write, tmp_path / "out", ONE, rerun="limit")
     with pytest.raises(ValueError, match="rerun: must be failed or limit, not 'all'"):

@@ -95,23 +95,6 @@ def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_pa
     assert found.attrs["impossible"] == edge.attrs["impossible"]
 
 
-MOMENTS = {"Ixx": 2, "Iyy": 20, "Izz": {"start": 11, "stop": 51, "num": 17}, "Ixy": 0}
-
-
-@pytest.mark.parametrize("change", [{"Ixx": [2, 12]}, {"Ixx": [2], "Ixy": [-0.3]}])
-def test_a_refined_map_infers_no_body_to_be_impossible(change: dict[str, Any]) -> None:
-    """It is known which are: some lie between others here, or there is hardly any that is not."""
-    config = {"body": {**MOMENTS, **change}, "friction": {"mu": 60}, "start": {"n0": 0.05}}
-    config |= {"integrator": {"t_end": 20}, "measure": ["reversals"]}
-    refined, full = sweep.run(config, refine=3), sweep.run(config)
-    gone, same = full["status"] == IMPOSSIBLE, refined["inferred"] == 0
-    assert 0 < gone.sum() < gone.size
-    np.testing.assert_array_equal(refined["status"] == IMPOSSIBLE, gone)
-    assert same.values[gone.values].all()
-    assert refined.attrs["simulated_share"] <= 1 - float(gone.mean())
-    np.testing.assert_array_equal(refined["reversals"].where(same), full["reversals"].where(same))
-
-
 def test_parts_of_a_run_tell_what_there_is(edge: xr.Dataset) -> None:
     """Even if no body of them can be."""
     part = edge.sel(b=0.9, offset=[1.0])

@@ -45,7 +45,7 @@ def tree(random: Random) -> list[list[Any]]:
         ["friction", [["mu", choose(("60", "[40, 60]", "{start: 20, stop: 200, num: 3}"))]]],
         ["start", [["n0", choose(("0.05", "[0.02, -0.05]"))], ["x0", choose(("0.01", "[0.0, 0.01]"))], ["y0", "1e-2"]]],
         ["integrator", [["t_end", "1500"], ["method", choose(("dopri5", "auto"))], ["tolerance", "1e-6"]]],
-        ["name", "x"], ["refine", "0"], ["max_failed_fraction", "0.01"],
+        ["name", "x"], ["max_failed_fraction", "0.01"],
         # As of a run by default, whose kernels are compiled already.
         ["measure", "[reversals, energy_error, noise_limited]"],
         ["model", choose(("slip", "slip", "noslip", "analytic"))],

@@ -145,7 +145,6 @@ SPECIAL = {
     "picture": lambda random: random.sample([*VARIABLES, *DERIVED], random.choice((1, 2))),
     "samples": lambda random: random.choice((1, 2, 3, 5)),
     "seed": lambda random: random.randrange(5),
-    "refine": lambda random: random.choice((0, 1, 2)),
     "integrator.t_end": lambda random: random.choice((20, 100.0, 300, 1000)),
     "integrator.step": lambda random: random.choice(("auto", 0.02, 0.05, 0.15, 1.0)),
     "integrator.tolerance": lambda random: random.choice((1e-4, 1e-6, 1e-8, 1e-10)),

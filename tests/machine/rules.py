@@ -197,16 +197,15 @@ class Machine(RuleBasedStateMachine):
         invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")
         predicted = sweep.predict(scene.config)
         for name in predicted.data_vars if found is not None else ():
-            if name in found or not scene.config.refine:
-                xr.testing.assert_equal(predicted[name], found[name])
+            xr.testing.assert_equal(predicted[name], found[name])
 
     # ---- the same cells elsewhere
 
     @rule(number=NUMBER, places=st.lists(NUMBER, min_size=1, max_size=4, unique=True))
     def as_cases(self, number: int, places: list[int]) -> None:
         """Some cells in any order have the same numbers alone and as cases, be they samples or of a grid."""
-        config, possible = self.config, self.rows["status"] != IMPOSSIBLE
-        if not len(ran := np.flatnonzero(oracles.simulated(self.found) & possible)):
+        config = self.config
+        if not len(ran := np.flatnonzero(self.rows["status"] != IMPOSSIBLE)):
             return
         cells = list(dict.fromkeys(int(ran[n % len(ran)]) for n in places))
         columns = {name: self.rows[name][cells].tolist() for name in self.varying or config.tier.parameters[:1]}
@@ -215,9 +214,9 @@ class Machine(RuleBasedStateMachine):
         settings = {f"integrator.{key}": value for key, value in config.integrator.model_dump().items()}
         settings |= {path: draws.numbers(value)[0] for path, value in given.items()}  # several are of other models
         alone = keys if len(cells) == 1 and number % 2 else {"cases": columns}
-        again = oracles.rows(self._run(self.scene.with_(settings | alone, *keys, "samples", "cases", "refine")))
+        again = oracles.rows(self._run(self.scene.with_(settings | alone, *keys, "samples", "cases")))
         there = {name: self.rows[name][cells] for name in self.rows if name in self.found.data_vars}
-        assert there.keys() - again.keys() <= {"inferred"}
+        assert there.keys() <= again.keys()
         oracles.same(again, there)
 
     @precondition(lambda self: len(self.config.axes) > 1 and len(self.config.distributions) < 2)
@@ -231,9 +230,8 @@ class Machine(RuleBasedStateMachine):
     def shuffled(self, number: int) -> None:
         """Nor does the order of the values along an axis."""
         name, values = [*self.config.axes.items()][number % len(self.config.axes)]
-        if not self.config.refine:
-            other = Random(number).sample(values, len(values))
-            self._compare(self._run(self.scene.with_({self.config.table[name].path: other})))
+        other = Random(number).sample(values, len(values))
+        self._compare(self._run(self.scene.with_({self.config.table[name].path: other})))
 
     def _compare(self, again: xr.Dataset) -> None:
         """The numbers of all cells are the same, and the variables."""
@@ -261,14 +259,13 @@ class Machine(RuleBasedStateMachine):
         """The cells of a run as cases, with parameters multiplied, if the kernels are there."""
         columns = {name: (self.rows[name] * factors.get(name, 1.0)).tolist() for name in self.config.tier.parameters}
         keys = (self.config.table[name].path for name in columns)
-        document = self.scene.with_({"cases": columns} | more, *keys, "samples", "cases", "picture", "refine")
+        document = self.scene.with_({"cases": columns} | more, *keys, "samples", "cases", "picture")
         for method, _, specs in [("", "", ()), *sorted(self.pool)]:  # its own if it can be
             integrator = document.get("integrator", {}) | {"method": method}
             own = {"measure": draws.written(specs), "integrator": integrator} if method else {}
             if self._allowed(document | own):
                 again = self._run(document | own)
-                ran = oracles.simulated(self.found)
-                oracles.alike(oracles.rows(self.found, ran), oracles.rows(again, ran), spin)
+                oracles.alike(oracles.rows(self.found), oracles.rows(again), spin)
                 return
 
     def _allowed(self, document: Any) -> bool:
@@ -281,7 +278,7 @@ class Machine(RuleBasedStateMachine):
     def longer(self, factor: float) -> None:
         """What ended before t_end ends alike if t_end is later."""
         later = self._run(self.scene.with_({"integrator.t_end": self.config.integrator.t_end * factor}))
-        ended = (self.rows["status"] != TIME_LIMIT) & oracles.simulated(self.found) & oracles.simulated(later)
+        ended = self.rows["status"] != TIME_LIMIT
         oracles.alike(*(oracles.rows(each, ended) for each in (self.found, later)))
 
     @rule(place=NUMBER, every=st.sampled_from([None, 5.0]))
@@ -289,11 +286,11 @@ class Machine(RuleBasedStateMachine):
         """A cell that is followed in time ends and counts alike."""
         config, cell = self.config, [place % len(self.rows["status"])]
         values = {name: float(self.rows[name][cell[0]]) for name in self.varying}
-        scene = self.scene.with_({}, "cases", "samples", "refine")
+        scene = self.scene.with_({}, "cases", "samples")
         if self.rows["status"][cell[0]] == IMPOSSIBLE:
             with pytest.raises(InputError):
                 sweep.trajectory(scene, **values)
-        elif oracles.simulated(self.found)[cell[0]]:
+        else:
             followed = self.ask("follow", lambda: sweep.trajectory(scene, stop_early=True, every=every, **values))
             if followed is not None and config.integrator.settles:
                 oracles.alike(oracles.rows(followed), oracles.rows(self.found, cell))
@@ -323,7 +320,6 @@ class Machine(RuleBasedStateMachine):
 
     # ---- over the files of an earlier run
 
-    @precondition(lambda self: not self.config.refine)
     @rule(number=NUMBER, ways=st.sets(st.sampled_from(["t_end", "axis", "samples", "measure", "name"]), min_size=1))
     def grow(self, number: int, ways: set[str]) -> None:
         """A run over the dataset of a smaller one, or of a shorter one, is that of all cells at once."""
@@ -357,8 +353,6 @@ class Machine(RuleBasedStateMachine):
     @rule(which=st.sampled_from(["failed", "limit"]), change=draws.draws(REPEATED, 1))
     def rerun(self, which: str, change: Draws) -> None:
         """Cells that are run again are those of a run with the new settings; the others stay."""
-        if self.config.refine:
-            return
         folder, document = self._new(), self.scene.with_({path: draws.setting(path, n) for path, n in change})
         if not self._allowed(document):
             return
@@ -409,7 +403,7 @@ class Machine(RuleBasedStateMachine):
                 columns[along][i] = points[f"end_{end}"].values[i]
             cases = {name: column.tolist() for name, column in columns.items()}
             keys = (self.config.table[name].path for name in columns)
-            again = oracles.rows(self._run(self.scene.with_({"cases": cases}, *keys, "refine", "picture")))
+            again = oracles.rows(self._run(self.scene.with_({"cases": cases}, *keys, "picture")))
             if "reversals" not in again:  # the search alone counts
                 return
             known = again["decided"] == 1 if "decided" in again else np.zeros(len(again["status"]), bool)

@@ -64,17 +64,6 @@ def test_a_legend_says_how_trajectories_failed(cells: xr.Dataset) -> None:
     words = legend(cells, "reversals")
     assert words["failed"] == "failed: 1 lifted off the table, 1 diverged (2)"
     assert words["time_limit"].startswith("lower bound")
-    assert "inferred" not in words
-
-
-def test_inferred_cells(cells: xr.Dataset) -> None:
-    spin = cells["spin_final"].where([False, True, True, True, True, True])
-    refined = cells.assign(inferred=("mu", [1, 0, 0, 0, 0, 0]), spin_final=spin)
-    assert marks(refined, "reversals")["inferred"].values.tolist() == [True] + 5 * [False]
-    assert not marks(refined, "reversals_predicted")["inferred"].any()
-    # Its final spin was not simulated, which is another thing than a missing value.
-    assert not marks(refined, "spin_final")["no_value"].any()
-    assert legend(refined, "spin_final")["inferred"] == "not simulated (1)"
 
 
 def test_the_difference(cells: xr.Dataset) -> None:

@@ -163,19 +163,18 @@ def test_hatches_stand_out_from_dark_and_light_cells() -> None:
     assert white.get_path().vertices[:, 1].max() <= black.get_path().vertices[:, 1].min()  # low counts are dark
 
 
-def test_failed_inferred_and_noise_limited_cells_are_told_apart() -> None:
+def test_failed_and_noise_limited_cells_look_different() -> None:
     dataset = made()
     dataset["status"][0] = DIVERGED
     dataset["noise_limited"][3] = 1
-    dataset["inferred"] = dataset["noise_limited"].copy(data=np.roll(dataset["noise_limited"], 2, axis=0))
     figure = picture.plot(dataset)
     axes = maps(figure)[0]
-    hatches = {marked(axes, kind)[0].get_hatch() for kind in ("failed", "noise_limited", "inferred", "time_limit")}
-    assert len(hatches) == 4
+    hatches = {marked(axes, kind)[0].get_hatch() for kind in ("failed", "noise_limited", "time_limit")}
+    assert len(hatches) == 3
     assert mesh(axes).get_array().mask[0].all()
     assert not mesh(maps(figure)[1]).get_array().mask.any()  # a prediction cannot fail
     assert not mesh(axes).get_array().mask[1:].any()
-    assert [text.split(" ")[0] for text in entries(figure)[:4]] == ["failed:", "lower", "inferred,", "limited"]
+    assert [text.split(" ")[0] for text in entries(figure)[:3]] == ["failed:", "lower", "limited"]
 
 
 def test_one_patch_covers_the_cells_and_nothing_else() -> None:
