@@ -81,7 +81,6 @@ def run(
     output: str | Path | None = None,
     *,
     fresh: bool = False,
-    rerun: str | None = None,
     progress: bool | None = None,
     reporter: Reporter | None = None,
     client: Client | str | None = None,
@@ -98,8 +97,6 @@ def run(
     output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from which the same
         call resumes. By default nothing is written
     fresh : discard the files of an earlier run in `output`
-    rerun : "failed" or "limit": repeat only the cells of the dataset in `output` that failed, or that reached the time
-        limit, with the present settings of the integrator; the other cells stay as they are
     progress : whether to show a progress bar; by default only in notebooks
     reporter : receives progress and messages instead of a bar
     client : a client of a dask cluster whose workers run the cells, or the address of its scheduler; by default the
@@ -125,7 +122,7 @@ def run(
     from sweep.engine.run import run
 
     with _prepared(config, overrides, progress, reporter) as (checked, reporter):
-        return run(checked, output, fresh=fresh, rerun=rerun, reporter=reporter, client=client)
+        return run(checked, output, fresh=fresh, reporter=reporter, client=client)
 
 
 def boundaries(

@@ -45,10 +45,8 @@ def _resumed(command: Callable[..., None]) -> Callable[..., None]:
 
 @click.command()
 @configured
-@click.option("--rerun", type=click.Choice(["failed", "limit"]),
-              help="Repeat only the cells of the dataset that failed, or that reached t_end.")  # fmt: skip
 @_resumed
-def run(config: Config, rerun: str | None, **how: Any) -> None:
+def run(config: Config, **how: Any) -> None:
     """Run the sweep that CONFIG describes.
 
     Writes NAME.nc (the dataset) and NAME.png (its maps), where NAME is the name of the run, and NAME_VARIABLE.png for
@@ -60,10 +58,7 @@ def run(config: Config, rerun: str | None, **how: Any) -> None:
     from sweep.engine.run import run as run_sweep
     from sweep.results.summary import failed_fraction
 
-    if rerun and how["dry_run"]:
-        refuse("--dry-run", "estimates whole runs only; leave out --rerun")
-    work = partial(run_sweep, config, rerun=rerun)
-    if (result := _written(config, "run", work, partial(estimate, config), **how)) is None:
+    if (result := _written(config, "run", partial(run_sweep, config), partial(estimate, config), **how)) is None:
         return
     failed = failed_fraction(result)
     if failed > config.max_failed_fraction:

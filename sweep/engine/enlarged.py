@@ -12,26 +12,22 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.config.document import parse_value
-from sweep.ended import without_ended
 from sweep.engine.plan import choose
 from sweep.engine.whole import Whole
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.methods import METHODS
-from sweep.kernels.status import FAILURES, TIME_LIMIT
+from sweep.kernels.status import TIME_LIMIT
 from sweep.models.model import Model
 from sweep.parameters import Parameter, sections
 from sweep.results import dataset, netcdf
 from sweep.results.dataset import ROWS
 from sweep.results.netcdf import open_dataset
-from sweep.results.provenance import Identity, identify
+from sweep.results.provenance import Identity
 from sweep.results.store import Store
 
-RERUN: dict[str, tuple[int, ...]] = {"failed": FAILURES, "limit": (TIME_LIMIT,)}
-"""Groups of cells that a run can be asked to repeat, with their statuses."""
-
-# Settings that may differ between a run and the one that it enlarges; repeating cells may change the integrator.
+# Settings that may differ between a run and the one that it enlarges.
 _FREE = {"name", "max_failed_fraction", "picture", "measure", "samples", "seed", "integrator.t_end"}
 
 
@@ -42,8 +38,6 @@ class Earlier:
     dataset: xr.Dataset
     cells: Array
     """For each cell of this run its index in the earlier one, or -1 if it has to be simulated, shape (cells,)."""
-    rerun: str | None = None
-    """Which cells are repeated, if others are reused although the settings differ."""
 
     @property
     def words(self) -> str:
@@ -66,29 +60,25 @@ class Earlier:
         return cells, arrays
 
 
-def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.Dataset, rerun: str | None) -> str:
+def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.Dataset) -> str:
     """Say why a run of `config` may not replace the dataset `there`, of the run `found`; return "" if it may.
 
-    It may if no result is lost: the same run with more cells, to a later time, or with more measurements; or, when
-    `rerun` cells are repeated, one with the same cells.
+    It may if no result is lost: the same run with more cells, to a later time, or with more measurements.
     """
-    same_program = (found.source_hash, found.versions) == (wanted.source_hash, wanted.versions)
-    if rerun is None and not (same_program and found.of_one_run):
+    if (found.source_hash, found.versions) != (wanted.source_hash, wanted.versions):
         return found.difference(wanted)
     edited = "a run, but has been edited since"
     if _is_edited(config, there):
         return edited
-    old, new = (_settings(_document(each.config), config.table) for each in (found, wanted))
+    old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
     # In a user-defined model, `model_sha256` identifies what `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
     changed |= {"film"} if config.film and there.attrs.get("film_sha256", "") not in ("", config.film.sha256) else set()
     less = [each for each in old["measure"] if each not in new["measure"]]
-    if rerun:
-        changed = {key for key in changed if not key.startswith("integrator.")}
-    grown, size = _match(config.grid, _grid(there)), there["status"].size
-    smaller = len(grown) != size if rerun else new["integrator.t_end"] < old["integrator.t_end"]
-    if changed or less or smaller or (grown >= 0).sum() < size:
+    sooner = new["integrator.t_end"] < old["integrator.t_end"]
+    kept = (_match(config.grid, _grid(there)) >= 0).sum()
+    if changed or less or sooner or kept < there["status"].size:
         return found.difference(wanted) or edited
     return ""
 
@@ -119,13 +109,10 @@ def is_whole(config: Config, path: Path) -> bool:
     return sizes == dict(zip(config.grid.dims, config.grid.shape, strict=True))
 
 
-def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
-    """Find the cells of `config` whose results, bit for bit, are in the dataset `there`, except those to `rerun`."""
+def taken_over(config: Config, there: xr.Dataset) -> Earlier:
+    """Find the cells of `config` whose results, bit for bit, are in the dataset `there`."""
     cells = _match(config.grid, _grid(there))
-    status = there["status"].values.ravel()
-    if rerun:
-        return Earlier(there, np.where(np.isin(status, RERUN[rerun])[cells], -1, cells), rerun)
-    old = _document(str(there.attrs["config"]))
+    old = parse_value(str(there.attrs["config"]), "dataset")
     if old["measure"] != config.document()["measure"] or not isinstance(config.tier, Model):
         return Earlier(there, np.full(len(cells), -1))
     if old["integrator"]["t_end"] != config.integrator.t_end:
@@ -133,11 +120,6 @@ def taken_over(config: Config, there: xr.Dataset, rerun: str | None) -> Earlier:
         depends = _depends_on_limit(config, config.grid.take(taken), there, cells[taken], old["integrator"]["t_end"])
         cells[taken[depends]] = -1
     return Earlier(there, cells)
-
-
-def _document(text: str) -> dict[str, Any]:
-    """Read the configuration of a dataset."""
-    return without_ended(parse_value(text, "dataset"))
 
 
 def _settings(document: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
@@ -224,7 +206,6 @@ class Enlarged(Whole):
         words = self._attributes(len(self.cells))
         if (self.earlier.cells >= 0).any():
             words["taken_over"] = self.earlier.words
-        words["config_hash"] = identify(self.config).again(self.earlier.rerun).config_hash
         return dataset.label(self.config, self.grid, arrays, words)
 
     def _place(self, cells: Array, found: Mapping[str, Array], arrays: dict[str, Array]) -> None:

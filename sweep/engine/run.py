@@ -18,10 +18,10 @@ import xarray as xr
 from sweep.config import Config, ConfigLike, InputError, load_config
 from sweep.engine import local
 from sweep.engine.cluster import connected, run_tiles
-from sweep.engine.enlarged import RERUN, Earlier, Enlarged, is_whole, reason_against, taken_over
+from sweep.engine.enlarged import Earlier, Enlarged, is_whole, reason_against, taken_over
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
-from sweep.faults import FileError, fault_of
+from sweep.faults import FileError
 from sweep.grid import Tile
 from sweep.interrupt import deferred, point
 from sweep.models.user.blame import blamed
@@ -46,22 +46,15 @@ def run(
     output: str | Path | None = None,
     *,
     fresh: bool = False,
-    rerun: str | None = None,
     reporter: Reporter | None = None,
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Run as `sweep.api.run`; messages go to `reporter` only."""
     config = load_config(config, overrides)
-    if rerun not in (None, *RERUN):
-        raise fault_of(f"must be {' or '.join(RERUN)}, not {rerun!r}", "rerun")
-    if rerun and fresh:
-        raise FileError("--rerun: it needs the dataset that --fresh discards; leave out one of the two")
-    if rerun and output is None:
-        raise FileError("rerun: it needs output, the folder of the run whose cells are to be simulated again")
     dataset.check_names(config)
     quantities.check_pictures(config)
-    reporter, identity = reporter or Reporter(), identify(config).again(rerun)
+    reporter, identity = reporter or Reporter(), identify(config)
     if config.film and config.film.omitted:
         reporter.note(config.film.omitted)
     if output is None:
@@ -76,13 +69,10 @@ def run(
         if found and not found.difference(identity) and is_whole(config, files.dataset):
             reporter.note(f"{files.dataset}: already complete, nothing to compute")
         else:
-            earlier = _earlier(config, found, identity, files, rerun)
-            if rerun and earlier and (earlier.cells >= 0).all():
-                reporter.note(f"{files.dataset}: has no such cells, nothing to compute")
-            else:
-                _forget_pictures(config, files)
-                store = Checkpoint(files.checkpoint, identity, reporter.note)
-                _compute(config, store, reporter, there, earlier).save(files.dataset)
+            earlier = _earlier(config, found, identity, files)
+            _forget_pictures(config, files)
+            store = Checkpoint(files.checkpoint, identity, reporter.note)
+            _compute(config, store, reporter, there, earlier).save(files.dataset)
         files.discard_checkpoint()
         point()
         result = files.opened(files.dataset, load=config.grid.size <= LARGE)
@@ -99,9 +89,7 @@ def _forget_pictures(config: Config, files: RunFiles) -> None:
         path.unlink(missing_ok=True)
 
 
-def _earlier(
-    config: Config, found: Identity | None, identity: Identity, files: RunFiles, rerun: str | None
-) -> Earlier | None:
+def _earlier(config: Config, found: Identity | None, identity: Identity, files: RunFiles) -> Earlier | None:
     """Read the cells of `config` from an earlier dataset, there now or when an interrupted run began.
 
     `found` is the identity of the existing dataset.
@@ -113,16 +101,14 @@ def _earlier(
     """
     if found:
         there = files.opened(files.dataset)
-        if reason := reason_against(config, found, identity, there, rerun):
+        if reason := reason_against(config, found, identity, there):
             raise not_resumed(files.dataset, reason)
         files.keep_earlier()
     elif files.earlier.exists():
         there = files.opened(files.earlier)
-    elif rerun:
-        raise FileError(f"{files.dataset}: no such file; --rerun needs the dataset of an earlier run")
     else:
         return None
-    return taken_over(config, there, rerun)
+    return taken_over(config, there)
 
 
 def _compute(

@@ -10,7 +10,7 @@ import platform
 import re
 import subprocess
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -48,15 +48,6 @@ class Identity:
     versions: str
     """Versions of this program and of the libraries that compile it."""
 
-    def again(self, rerun: str | None) -> Identity:
-        """Return the identity of a run that repeats only the cells `rerun`."""
-        return replace(self, config_hash=f"{self.config_hash}+{rerun}") if rerun else self
-
-    @property
-    def of_one_run(self) -> bool:
-        """Return whether no cells were repeated with other settings, so that more cells may be added."""
-        return "+" not in self.config_hash
-
     def difference(self, other: Identity) -> str:
         """Say why a run of `other` cannot resume files with this identity; return "" if it can."""
         if not self.config_hash:
@@ -65,7 +56,6 @@ class Identity:
             old, new = (c.config.splitlines() for c in (self, other))
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
-            changed += [] if self.of_one_run else ["some cells were repeated (--rerun)"]
             unseen = [name for key, name in _UNSEEN.items() if re.search(rf"\b{key}: ", other.config)]
             changed = changed or [f"{either(unseen or ['the order of the axes'])} differs"]
             return "another configuration:\n  " + "\n  ".join(changed)

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write
-from support.cli import invoke, refused
 from support.physics import TURNS, stone
 from support.runs import Heard, Stop, same_numbers
 
 import sweep
 from sweep import FileError
 from sweep.engine.enlarged import taken_over
-from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
+from sweep.kernels.status import SETTLED
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -107,7 +106,7 @@ def test_what_is_taken_over_is_not_computed_again(write: Write, tmp_path: Path) 
 def test_the_time_limit_leaves_no_trace(write: Write, t_end: int) -> None:
     """Only cells that do not depend on the limit are reused; another number of steps is another run."""
     short, config = sweep.run(write(MORE)), sweep.load_config(write(MORE.replace("3000", str(t_end))))
-    cells = taken_over(config, short, None).cells
+    cells = taken_over(config, short).cells
     taken = np.flatnonzero(cells >= 0)
     assert len(taken) == 0 if t_end == 3037 else len(taken) > 5
     assert set(short["status"].values.ravel()[cells[taken]]) <= {SETTLED}
@@ -121,9 +120,9 @@ def test_what_adams_foresaw_is_not_taken_over(write: Write) -> None:
     """Near the limit it takes short steps where it would have leapt on to a later one."""
     text = by("adams", MORE)
     short, later = sweep.run(write(text)), sweep.load_config(write(text.replace("3000", "6000")))
-    assert (taken_over(later, short, None).cells >= 0).sum() > 5
+    assert (taken_over(later, short).cells >= 0).sum() > 5
     short["t_stop"] = 3000 - 100 * short["step"]
-    assert (taken_over(later, short, None).cells < 0).all()
+    assert (taken_over(later, short).cells < 0).all()
 
 
 @pytest.mark.usefixtures("short_chunks")
@@ -178,9 +177,8 @@ def test_nothing_is_taken_from_an_edited_dataset(how: str, write: Write, tmp_pat
     text = by("dopri5", ONE) + MEASURED
     there, _ = grown(write, tmp_path / "out", text)
     EDITS[how](there).to_netcdf(tmp_path / "out" / "small.nc")
-    for options in ({"n0": [0.02, 0.03, 0.05]}, {"rerun": "limit"}):
-        with pytest.raises(FileError, match=r"edited since|another configuration"):
-            grown(write, tmp_path / "out", text, **options)
+    with pytest.raises(FileError, match=r"edited since|another configuration"):
+        grown(write, tmp_path / "out", text, n0=[0.02, 0.03, 0.05])
 
 
 def test_a_part_of_a_dataset_is_no_complete_run(write: Write, tmp_path: Path) -> None:
@@ -206,50 +204,3 @@ def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> Non
     for change in changes:
         with pytest.raises(FileError, match="not resumed"):
             grown(write, tmp_path / "out", SCENE.replace(*change))
-
-
-def test_rerun_computes_just_those_cells(write: Write, tmp_path: Path) -> None:
-    short, _ = grown(write, tmp_path / "out", MORE)
-    limit = short["status"] == TIME_LIMIT
-    assert 0 < limit.sum() < limit.size
-    later = MORE.replace("3000", "5000, tolerance: 1e-7")
-    found, (note,) = grown(write, tmp_path / "out", later, rerun="limit")
-    assert note.startswith(f"{int((~limit).sum())} of 24 cells are reused")
-    expected = sweep.run(write(later))
-    for name in ("reversals", "spin_final", "t_stop", "step", "status"):
-        xr.testing.assert_equal(found[name], xr.where(limit, expected[name], short[name]))
-    # Settings differ from cell to cell now: no other run may add to these.
-    with pytest.raises(FileError, match="some cells were repeated"):
-        grown(write, tmp_path / "out", later.replace("[40, 50", "[30, 40, 50"))
-
-
-def test_rerun_of_failed_cells(write: Write, tmp_path: Path) -> None:
-    violent = ONE.replace("[0.02, 0.05]", "[0.05, 3.0]").replace("x0: 0.01", "x0: 5") + "max_failed_fraction: 1\n"
-    short, _ = grown(write, tmp_path / "out", violent)
-    failed = np.isin(short["status"], (LIFT_OFF,))
-    assert 0 < failed.sum() < failed.size
-    found, (note,) = grown(write, tmp_path / "out", violent, rerun="failed", tolerance=1e-4)
-    assert note.startswith(f"{int((~failed).sum())} of 12 cells are reused")
-    np.testing.assert_array_equal(found["status"].values[~failed], short["status"].values[~failed])
-    assert (found["step"].values != short["step"].values)[failed].all()
-
-
-def test_rerun_of_no_cells_leaves_a_dataset_that_can_grow(write: Write, tmp_path: Path) -> None:
-    grown(write, tmp_path / "out", FEWER)
-    before = (tmp_path / "out" / "small.nc").read_bytes()
-    assert "has no such cells" in grown(write, tmp_path / "out", FEWER, rerun="failed")[1][0]
-    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == {"small.nc": before}
-
-
-def test_rerun_needs_a_dataset(write: Write, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"^rerun: it needs output, the folder of the run"):
-        sweep.run(write(ONE), rerun="failed")
-    with pytest.raises(FileError, match="--rerun needs the dataset"):
-        grown(write, tmp_path / "out", ONE, rerun="limit")
-    with pytest.raises(ValueError, match="rerun: must be failed or limit, not 'all'"):
-        grown(write, tmp_path / "out", ONE, rerun="all")
-    grown(write, tmp_path / "out", SINGLE)
-    with pytest.raises(FileError, match="leave out one of the two"):
-        grown(write, tmp_path / "out", SINGLE, rerun="limit", fresh=True)
-    refused(invoke("run", write(ONE), "--rerun", "limit", "--dry-run"), "--dry-run: estimates whole runs only")
-    assert (tmp_path / "out" / "small.nc").exists()

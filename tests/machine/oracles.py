@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import permutations
 from typing import Any
 
@@ -80,10 +79,10 @@ def sound(config: Config, dataset: xr.Dataset) -> None:
         assert (found["t_last_reversal"][some] <= found["t_stop"][some]).all()
 
 
-def same(one: Rows, other: Rows, names: Iterable[str] = ()) -> None:
-    """The same numbers of the same cells, of all variables that both have or of those that are named."""
-    for name in names or one:
-        if name in one and name in other:
+def same(one: Rows, other: Rows) -> None:
+    """The same numbers of the same cells, of all variables that both have."""
+    for name in one:
+        if name in other:
             np.testing.assert_array_equal(one[name], other[name], name)
 
 

@@ -37,7 +37,7 @@ from machine.meetings import Features, Meetings, features
 from sweep.config import Config, InputError, load_config
 from sweep.config.document import parse_value
 from sweep.faults import Error
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT
+from sweep.kernels.status import IMPOSSIBLE, TIME_LIMIT
 from sweep.plots.formats import PICTURES
 from sweep.results.kind import RUN, kind, require_whole
 from sweep.results.summary import contents, describe
@@ -61,8 +61,6 @@ CHANGES = st.tuples(draws.draws(draws.PHYSICAL, 5, 2), draws.draws(draws.OTHERWI
 )
 SCENES = several(st.tuples(NUMBER, CHANGES), 4)
 PICTURE = draws.draws(words.TAKEN["plot"], 4)
-REPEATED = ["integrator.t_end", "integrator.tolerance"]
-NUMBERS = ("status", "reversals", "t_stop", "spin_final", "t_last_reversal", "margin", "decided")
 STUDIES = ("boundaries", "critical", "indices")
 NUMERALS = re.compile(r"-?\d+(\.\d*)?(e-?\d+)?")
 
@@ -349,21 +347,6 @@ class Machine(RuleBasedStateMachine):
             found = self._run(self.scene.with_(more), folder)
             same_numbers(found, self._run(self.scene.with_(more)))
             self.others.append(found)
-
-    @rule(which=st.sampled_from(["failed", "limit"]), change=draws.draws(REPEATED, 1))
-    def rerun(self, which: str, change: Draws) -> None:
-        """Cells that are run again are those of a run with the new settings; the others stay."""
-        folder, document = self._new(), self.scene.with_({path: draws.setting(path, n) for path, n in change})
-        if not self._allowed(document):
-            return
-        old = oracles.rows(self._run(self.config, folder))
-        with nothing_drawn():
-            again = self.ask("rerun", lambda: sweep.run(document | {"name": self.config.name}, folder, rerun=which))
-        if again is not None:
-            new, fresh = oracles.rows(again), oracles.rows(self._run(document))
-            repeated = np.isin(old["status"], FAILURES if which == "failed" else TIME_LIMIT)
-            for cells, rows in ((repeated, fresh), (~repeated, old)):
-                oracles.same({k: v[cells] for k, v in new.items()}, {k: v[cells] for k, v in rows.items()}, NUMBERS)
 
     @rule(drawn=several(asked_of(["run", "run", *STUDIES], words.TAKEN, 2)), chunks=st.integers(0, 3))
     def interrupted(self, drawn: list[Asked], chunks: int) -> None:

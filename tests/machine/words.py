@@ -42,7 +42,7 @@ TEXTS: dict[str | None, tuple[str, ...]] = {
 """Texts that an option may have, by what its help calls them; any of them where the help has another word."""
 
 VALUES: dict[str, tuple[Any, ...]] = {
-    "rerun": ("failed", "limit"), "x": AXES, "y": AXES, "variable": (*VARIABLES, *DERIVED),
+    "x": AXES, "y": AXES, "variable": (*VARIABLES, *DERIVED),
     "sel": ({"n0": 0.05}, {"mu": 60}, {"b": 3}, {"case": 0}), "limits": ((0, 5), (-1, 1), (1, 0), (0, 1e7)),
     "cmap": ("viridis", "no"), "width": ("85mm", "50mm", "3in"), "figsize": ((4, 3), (8, 8), (1, 1)),
     "bracket": (0.01, 0.1, 0.5), "deviation": (0.01, 0.1), "every": (0.5, 5.0, 1e3), "samples": (1, 2),
