@@ -244,7 +244,7 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
     asked = [spec.partition("=")[0] for spec in values.measure or ()]
     alone = any(TANGENT in MEASURES[name].follows for name in asked)
     if "method" not in said or (alone and integrator.method == methods.AUTO):
-        choice = isinstance(model, Model) and len(methods.allowed(model)) > 1 and integrator.step == "auto"
+        choice = isinstance(model, Model) and len(methods.automatic(model)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice and not alone else methods.PLAIN
     if "t_end" not in said:
         found["t_end"] = usual = _longest(schema.T_END, in_si)

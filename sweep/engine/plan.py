@@ -89,7 +89,7 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
 def kernels(config: Config, chosen: Sequence[Cells] = ()) -> list[Kernel]:
     """Return the kernels that run the cells of `chosen`, or all that a run may need."""
     method = config.integrator.method
-    names = [each.method for each in chosen] or (methods.allowed(config.equations) if method == AUTO else [method])
+    names = [each.method for each in chosen] or (methods.automatic(config.equations) if method == AUTO else [method])
     return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
 

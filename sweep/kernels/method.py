@@ -63,6 +63,8 @@ class Method:
     """The limit of an automatic step besides the tolerance, in words for the provenance; "" if there is none."""
     runs: Callable[[Model], bool] = lambda model: True
     """(model) -> whether it can integrate this model; by default it can integrate all."""
+    automatic: bool = False
+    """Whether `method: auto` may choose it.  If so, it changes the numbers of all runs that name no method."""
     step_cost: float = 1.0
     """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
     start_up_cost: float = 0.0

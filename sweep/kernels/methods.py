@@ -28,12 +28,17 @@ def allowed(model: Model) -> tuple[str, ...]:
     return tuple(name for name, method in METHODS.items() if method.runs(model))
 
 
+def automatic(model: Model) -> tuple[str, ...]:
+    """Names of the methods among which `auto` chooses for a model."""
+    return tuple(name for name in allowed(model) if METHODS[name].automatic)
+
+
 def cheapest(model: Model, columns: Columns, tolerance: Tolerance, t_end: float) -> tuple[Array, Array, Array]:
     """Choose the method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
 
     Returns the names of the methods, with the step and rule of `automatic_step`, each of shape (cells,).
     """
-    rates, names = (fastest_motion(model, columns), model.fastest_decay(columns)), allowed(model)
+    rates, names = (fastest_motion(model, columns), model.fastest_decay(columns)), automatic(model)
     found = [_step(METHODS[name], model, columns, *rates, tolerance) for name in names]
     with np.errstate(divide="ignore"):  # at hardly any friction a method may have no step at all
         costs = [METHODS[name].step_cost * (t_end / step + METHODS[name].start_up_cost)

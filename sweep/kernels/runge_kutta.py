@@ -135,6 +135,7 @@ def method(tableau: Tableau) -> Method:
         stable_step=lambda decay: np.asarray(longest / decay),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
+        automatic=tableau.automatic,
         error_order=tableau.order,
         takes_every_step=True,
     )

@@ -37,6 +37,9 @@ class Tableau:
     """Error constant of the start: the relative error of the slip, with steps of `LAYER_STEP` decay times, while it
     goes from zero to the value that follows from the slow motion.  It falls with the same power."""
 
+    automatic: bool = False
+    """Whether `method: auto` may choose it."""
+
     @property
     def stages(self) -> int:
         return len(self.b)
@@ -64,6 +67,7 @@ DOPRI5 = Tableau(
     real_stability=3.3066,
     phase=1.0,
     layer_error=0.02,
+    automatic=True,
 )
 
 TABLEAUS = (DOPRI5,)

@@ -86,6 +86,7 @@ def run(**settings):
 exact, _ = run(method="dopri5", step=0.02)
 errors = [abs(run(method="rk4", step=step)[0] - exact) for step in (0.8, 0.4, 0.2)]
 assert np.allclose(np.diff(np.log2(errors)), -4, atol=0.1), errors
+assert sweep.load_config({"model": "averaged", "friction": {"mu": 20}}).integrator.method == "dopri5"  # not the new one
 (loose, long), (tight, short) = (run(method="rk4", tolerance=tolerance) for tolerance in (1e-6, 1e-10))
 assert abs(loose - exact) < 1e-6
 assert abs(tight - exact) < 1e-10

@@ -22,7 +22,7 @@ from sweep.config import Config, InputError, load_config
 from sweep.config.distributions import FAMILIES
 from sweep.config.schema import PATHS, schema_of
 from sweep.kernels.measures import MEASURES, chosen
-from sweep.kernels.methods import AUTO, allowed, cheapest
+from sweep.kernels.methods import AUTO, automatic, cheapest
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots.quantities import DERIVED, check_pictures
@@ -207,7 +207,7 @@ MOST_CELLS, MOST_STEPS = 40, 5e5
 
 def kernels(config: Config) -> set[Piece]:
     """What a run of the configuration may need."""
-    methods = allowed(config.equations) if config.integrator.method == AUTO else [config.integrator.method]
+    methods = automatic(config.equations) if config.integrator.method == AUTO else [config.integrator.method]
     return {(method, config.tier.name, compiled(config.measure)) for method in methods}
 
 

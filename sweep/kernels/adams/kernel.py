@@ -246,6 +246,7 @@ METHOD = Method(
     stepper=_stepper,
     accurate_step=accurate_step,
     runs=has_form,
+    automatic=True,
     # On one thread start-up takes 8 to 11 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
     start_up_cost=650.0,
