@@ -2,7 +2,7 @@
 
 The cells are a fixed random sample of the parameters that a sweep covers.  None is left out, so shares of right counts
 are meaningful.  The equations are the package's own, traced into heyoka.py's Taylor series;
-`scripts/reference_counts.py` looks for errors in their derivation.
+`data/reference_counts.csv` holds counts from another derivation.
 
 All states but ω3 are in multiples of `UNIT`: heyoka's tolerance is relative to the largest state, which in these
 units belongs to the rattle, however small it gets.  The integral of the ripple-free spin n* (`reversals.py`) is an

@@ -1,6 +1,6 @@
 """Reversal counts and spins against another derivation of the equations, other integrators and more digits.
 
-`scripts/reference_counts.py` and its neighbours made the tables; `data/README.md` says how.
+`data/README.md` describes how the tables were made.
 """
 
 import numpy as np
