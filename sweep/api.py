@@ -521,12 +521,13 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """
     from sweep import prediction
     from sweep.config import load_config
-    from sweep.results import dataset
+    from sweep.results import dataset, kind
 
     register()
     checked = load_config(config, overrides)
     found = prediction.predict(checked.tier, checked.grid, checked.measure).variables
-    return dataset.label(checked, checked.grid, found, {"config": checked.label()})
+    attributes = {kind.ATTRIBUTE: kind.RUN.name, "config": checked.label()}
+    return dataset.label(checked, checked.grid, found, attributes)
 
 
 def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Dataset:
@@ -541,7 +542,7 @@ def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Datas
     Raises
     ------
     FileError
-        if the file is not a dataset of this program, or is larger than memory.
+        if the file is not a dataset of this program.
 
     Examples
     --------

@@ -13,7 +13,6 @@ from typing import Any, NoReturn
 
 import click
 
-from sweep.ended import ended
 from sweep.faults import Error, Fault, InputError, fault_of, printable
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import Parameter
@@ -80,11 +79,6 @@ class Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except click.NoSuchOption as error:
-            verb = error.ctx.info_name if error.ctx else ""
-            if not (reason := ended(error.option_name, f"{verb} {error.option_name}")):
-                raise
-            say(f"{error.option_name}: {reason}", err=True)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(INTERRUPTED)

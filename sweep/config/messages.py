@@ -14,7 +14,6 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from sweep.ended import ended
 from sweep.faults import Path, either, refusal, suggestion
 
 _SIDEWAYS = re.compile(r"(?:offset|com|cm|cent(?:re|er)(?:_of_(?:mass|gravity))?)_?[xy12]|[xy]_?(?:offset|com|cm|s|g)")
@@ -50,8 +49,7 @@ def explain(errors: Iterable[Any], schema: type[BaseModel]) -> dict[Path, tuple[
         elif kind == "extra_forbidden":
             key = str(path[-1])
             more = _OFF_AXIS if _SIDEWAYS.fullmatch(key) else _other_key(key, section, sections)
-            unknown = f"unknown key{more}; the keys here are {', '.join(section.model_fields)}"
-            found[path] = ended(".".join(map(str, path))) or unknown, True
+            found[path] = f"unknown key{more}; the keys here are {', '.join(section.model_fields)}", True
         elif kind == "value":
             found[*path, *error["ctx"]["at"]] = error["ctx"]["reason"], False
         elif kind == "missing":

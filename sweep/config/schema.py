@@ -11,7 +11,6 @@ from pydantic.fields import FieldInfo
 
 from sweep.config.messages import Allowed, wrong
 from sweep.config.values import MAX_AXIS, Strict, Whole, in_si, parse_values, whole
-from sweep.ended import ended
 from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.misfit import Misfit
@@ -39,8 +38,6 @@ def _measures(raw: Any) -> Any:
 
 def _measure(raw: Any, i: int) -> str:
     name, setting = next(iter(raw.items())) if isinstance(raw, dict) and len(raw) == 1 else (raw, None)
-    if isinstance(name, str) and (words := ended(name)):
-        raise wrong(f"{name} {words}", i)
     if not isinstance(name, str) or name not in MEASURES:
         raise wrong(refusal(name, either(MEASURES), MEASURES), i)
     kind = MEASURES[name]

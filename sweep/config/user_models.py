@@ -12,7 +12,6 @@ import numpy as np
 from sweep.config.configuration import Config
 from sweep.config.document import Document
 from sweep.config.schema import SETTINGS
-from sweep.ended import ENDED
 from sweep.faults import InputError, brief, either, fault_of
 from sweep.grid import CASE, SAMPLE
 from sweep.models import TIERS
@@ -21,9 +20,7 @@ from sweep.models.user import loading, trial
 
 SUFFIX = ".py"
 
-TAKEN = frozenset({path.rpartition(".")[2] for path in (*SETTINGS, *ENDED)}) | {
-    "integrator", CASE, SAMPLE, "trajectory", "time",
-}  # fmt: skip
+TAKEN = {path.rpartition(".")[2] for path in SETTINGS} | {"integrator", CASE, SAMPLE, "trajectory", "time"}
 """Names with another meaning in a configuration or as a dimension, which a user's parameter cannot have."""
 
 

@@ -34,7 +34,19 @@ from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
 from sweep.results.dataset import VARIABLES
-from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, INDICES, RUN, TRAJECTORY, Kind, kind, require_whole
+from sweep.results.kind import (
+    ATTRIBUTE,
+    BOUNDARIES,
+    CHANGES,
+    CRITICAL,
+    FIT,
+    INDICES,
+    RUN,
+    TRAJECTORY,
+    Kind,
+    kind,
+    require_whole,
+)
 from sweep.results.netcdf import open_dataset
 from sweep.results.writing import replacing
 from sweep.units import LENGTH, quantity
@@ -154,7 +166,7 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
     if isinstance(source, xr.DataArray):
         if source.name not in {*VARIABLES, *DERIVED}:
             raise fault_of(f"{source.name or 'an array without a name'} is not a variable of a run; pass the dataset")
-        return source.to_dataset()
+        return source.to_dataset().assign_attrs({ATTRIBUTE: RUN.name})
     return source if isinstance(source, xr.Dataset) else open_dataset(Path(source))
 
 
@@ -220,7 +232,7 @@ def _of_size(
 
 def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> None:
     """Draw one map or curve into the user's axes."""
-    if kind(dataset) != RUN:
+    if kind(dataset) not in (RUN, None):
         raise fault_of("only a map or a curve of a run is drawn into given axes", "ax")
     chosen = panels.choose(dataset, variable, **axes, alone=True)
     if len(chosen.each) > 1 or (chosen.names == ["probability"] and "count" in chosen.dataset.dims):

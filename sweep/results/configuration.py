@@ -9,7 +9,6 @@ import xarray as xr
 
 from sweep.config import Config, load_config
 from sweep.config.document import parse_value
-from sweep.ended import without_ended
 from sweep.faults import fault_of
 from sweep.grid import CASE
 from sweep.kernels.measures.misfit import Misfit
@@ -36,7 +35,6 @@ def configuration(
     values = parse_value(str(dataset.attrs.get("config", "")), "config")
     if not isinstance(values, dict):
         raise fault_of("a configuration is a mapping of keys to values", "config")
-    values = without_ended(values)
     cases = values.pop("cases", None)
     if isinstance(measure := values.get("measure"), list):
         values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]

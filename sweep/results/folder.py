@@ -35,7 +35,6 @@ class RunFiles:
 
     def require_writable(self) -> None:
         """Raise a `FileError` if dataset or picture cannot be written."""
-        netcdf.require_name(self.dataset)
         for path in (self.dataset, self.picture):
             require_writable(path)
 

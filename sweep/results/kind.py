@@ -1,17 +1,16 @@
-"""Defines the kinds of dataset: what each contains, and how to recognise it."""
+"""Defines the kinds of dataset and what each contains."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from numbers import Number
 from pathlib import Path
 
 import xarray as xr
 
 from sweep.faults import FileError, counted
 from sweep.parameters import PARAMETERS
-from sweep.results.dataset import SIDES, VARIABLES
+from sweep.results.dataset import SIDES
 from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
 from sweep.results.probabilities import PROBABILITIES
@@ -31,8 +30,6 @@ class Kind:
     """The command or function that creates it."""
     words: str
     """What it contains."""
-    marks: frozenset[str]
-    """Variables and dimensions that identify a dataset without a recorded kind."""
     explored: bool = False
     """Whether the explorer shows it."""
     needs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -52,32 +49,32 @@ _ENDS = [f"{order}{end}" for order in ("first_order", "total_order") for end in 
 _FITTED = ("value", *(f"{end}_{share}" for share in (68, 95) for end in ("lower", "upper")))
 
 TRAJECTORY = Kind(
-    "trajectory", "single trajectories", frozenset({"trajectory"}),
+    "trajectory", "single trajectories",
     needs=_over(("trajectory",), "status", "t_stop") | _over(("time",), "time") | {"spin": ("trajectory", "time")},
 )  # fmt: skip
 CRITICAL = Kind(
-    "critical", "critical spins", frozenset({"critical_reason"}), explored=True,
+    "critical", "critical spins", explored=True,
     needs=_over((), "critical_reason", *(f"{name}_reason" for name in SPINS), *SPINS.values()),
 )  # fmt: skip
 BOUNDARIES = Kind(
-    "boundaries", "boundaries", frozenset({"level", "curve", "end_more"}),
+    "boundaries", "boundaries",
     needs=_over(("point",), *POINTS), attributes=("x", "y", "trajectories"),
 )  # fmt: skip
 FIT = Kind(
-    "fit", "a fit", frozenset({"seen", "fitted"}),
+    "fit", "a fit",
     needs=_over(("parameter",), *_FITTED) | _over(("time",), "time", "seen", "fitted"),
     attributes=("title", "undetermined"),
 )  # fmt: skip
 INDICES = Kind(
-    "indices", "Sobol indices", frozenset({"first_order", "total_order"}),
+    "indices", "Sobol indices",
     needs=_over(("quantity", "parameter"), *_ENDS) | {name: (name,) for name in ("quantity", "parameter")},
     attributes=("title", "trajectories"),
 )  # fmt: skip
 CHANGES = Kind(
-    "changes", "changes of a body", frozenset({"change", "unchanged_at", "changed_at"}),
+    "changes", "changes of a body",
     needs=_over(("parameter",), "parameter", "value", "change", "changed_at", "reversals"), attributes=("reversals",),
 )  # fmt: skip
-RUN = Kind("run", "a run", frozenset(), explored=True)
+RUN = Kind("run", "a run", explored=True)
 """Kinds whose variables depend on what was measured. Predictions and a part of a run count as a run."""
 
 _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
@@ -86,26 +83,12 @@ _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
 _CODES = ("status", "level", "curve", "outcome")
 """Variables that become meaningless once averaged."""
 
-_TEXTS = (
-    "title", "config", "x", "y", "surface", "pictured", "undetermined", "verdict", "fits_because", "model_parameters",
-    "model_brings",
-)  # fmt: skip
-"""Optional attributes that are texts."""
-
-_NUMBERS = ("wall_time", "trajectories_per_second", "fits")
-"""Optional attributes that are numbers."""
-
 _KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, CHANGES, RUN)}
 
 
 def kind(dataset: xr.Dataset) -> Kind | None:
-    """Return the recorded kind of a dataset, or else the kind that its variables imply; None if neither is known."""
-    if named := _KINDS.get(str(dataset.attrs.get(ATTRIBUTE))):
-        return named
-    there = {*dataset.variables, *dataset.dims}
-    if found := [each for each in _KINDS.values() if each.marks and each.marks <= there]:
-        return found[0]
-    return RUN if set(VARIABLES) & set(dataset.data_vars) else None
+    """Return the recorded kind of a dataset; None if none of ours is recorded."""
+    return _KINDS.get(str(dataset.attrs.get(ATTRIBUTE)))
 
 
 def opened(path: Path, *, load: bool = True) -> xr.Dataset:
@@ -128,9 +111,7 @@ def require_whole(dataset: xr.Dataset, name: str = "the dataset") -> xr.Dataset:
 def fault(dataset: xr.Dataset) -> str:
     """Say why a dataset cannot be shown, for example because it was averaged or cut; return "" if it can."""
     if (found := kind(dataset)) is None:
-        return "not a dataset of sweep: no variable of it, such as status"
-    if odd := _foreign(dataset):
-        return f"{odd}; another program wrote or changed it"
+        return f"not a dataset of sweep, or {ATTRIBUTE} was dropped; keep it with xarray.set_options(keep_attrs=True)"
     if odd := odd_axis(dataset, (dim for dim in dataset.sizes if dim not in _MAY_BE_EMPTY)):
         return odd
     needs, there = _needs(dataset, found), {name: {*variable.dims} for name, variable in dataset.variables.items()}
@@ -155,25 +136,6 @@ def odd_axis(dataset: xr.Dataset, dims: Iterable[Hashable]) -> str:
             return f"the axis {dim} has no values; select at least one"
         if dim in dataset.indexes and dataset.indexes[dim].nlevels > 1:
             return f"the axis {dim} is stacked; unstack it"
-    return ""
-
-
-def _foreign(dataset: xr.Dataset) -> str:
-    """Say which attribute or variable differs from what sweep writes; return "" if none does."""
-    for name in _TEXTS:
-        if not isinstance(dataset.attrs.get(name, ""), str):
-            return f"the attribute {name} is not text"
-    for name in _NUMBERS:
-        if not isinstance(dataset.attrs.get(name, 0), Number):
-            return f"the attribute {name} is not a number"
-    cells = {*dataset["status"].dims} if "status" in dataset else None
-    for name in (name for name in VARIABLES if name in dataset.data_vars):
-        spec, variable = VARIABLES[name], dataset[name]
-        if variable.dtype.kind not in "biuf":
-            return f"the variable {name} holds no numbers"
-        over = {*variable.dims} - {spec.along}
-        if cells is not None and not (over <= cells if spec.per_body else over == cells):
-            return f"the variable {name} is not over the axes of status"
     return ""
 
 

@@ -7,7 +7,6 @@ in place can be opened before it is complete.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -47,7 +46,7 @@ def write(
                     target.setncatts(variable.attrs)
                 for name, place, values in pieces:
                     file[name][place] = values
-        except RuntimeError as error:  # netCDF's own error hides the system's
+        except (RuntimeError, UnicodeError) as error:  # netCDF's own error hides the system's
             probe(temporary)
             raise FileError(f"{path}: cannot be written: {error}") from None
 
@@ -61,38 +60,16 @@ def _write_frame(frame: xr.Dataset, path: Path) -> None:
         frame.to_netcdf(path, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
 
-def require_name(path: Path) -> None:
-    """Raise a `FileError` if netCDF cannot open files at this path."""
-    try:
-        os.path.abspath(path).encode()
-    except UnicodeEncodeError:
-        raise FileError(f"{path}: its full path is not UTF-8, as netCDF needs it; rename the folder") from None
-
-
 def open_dataset(path: Path, *, load: bool = True) -> xr.Dataset:
     """Read a dataset into memory, or on demand with `load=False`; raise a `FileError` if it is not one."""
     if not path.is_file():
         raise FileError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
-    require_name(path)
     try:
-        if load:
-            _refuse_larger_than_memory(path)
         dataset = xr.open_dataset(path, engine="netcdf4", decode_times=False)
         if load:
             with dataset:
                 dataset.load()
         return dataset
-    except FileError:
-        raise
     except Exception as error:  # the errors that HDF5, netCDF and xarray raise for damaged files are undocumented
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"{path}: not a netCDF dataset, or damaged: {reason}") from None
-
-
-def _refuse_larger_than_memory(path: Path) -> None:
-    # A file of a few bytes can declare any number of values.
-    with netCDF4.Dataset(path) as file:
-        size = sum(variable.size * np.dtype(variable.dtype).itemsize for variable in file.variables.values())
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if size > memory:
-        raise FileError(f"{path}: {size / 2**30:.3g} GiB of data are more than the memory, {memory / 2**30:.3g} GiB")

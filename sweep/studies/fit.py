@@ -20,7 +20,6 @@ from scipy.stats import qmc
 from sweep.config import Config, Values
 from sweep.config.cross_checks import misplaced, unlike
 from sweep.config.film import Film
-from sweep.ended import ended
 from sweep.faults import brief, counted, fault_of, suggestion
 from sweep.grid import BODY, Array
 from sweep.interrupt import deferred
@@ -144,8 +143,6 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
     if not free:
         raise fault_of(f"name at least one free parameter, out of {', '.join(known)}")
     for name in free:
-        if name not in known and (words := ended(name)):
-            raise fault_of(words, name)
         if name not in known:
             message = f"{brief(name)} is not a parameter of the {config.tier.name} model{suggestion(name, known)}"
             raise fault_of(f"{message}; these can be free: {', '.join(known)}")

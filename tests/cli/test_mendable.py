@@ -1,7 +1,6 @@
 """What ends a command: a fault of the user is one line, before anything is computed; ours shows its traceback."""
 
 import errno
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -96,14 +95,6 @@ def _no_work(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_no_work")
-@pytest.mark.parametrize("verb", VERBS)
-def test_a_path_that_netcdf_cannot_write_is_refused_at_once(verb: str, write: Write, tmp_path: Path) -> None:
-    folder = tmp_path / os.fsdecode(b"f\xff")
-    refused(invoke(*verb.split(), write(TEXT), "--output", folder), ".nc: its full path is not UTF-8")
-    assert not folder.exists()
-
-
-@pytest.mark.usefixtures("_no_work")
 @pytest.mark.parametrize("verb", [*VERBS, "reproduce", "animate"])
 def test_a_disk_that_cannot_be_written_is_refused_at_once(
     verb: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -150,27 +141,16 @@ CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "one of them": (lambda d: d.isel(trajectory=0), "lacks the axis trajectory of status and 2 other things; it was"),
     "no spin": (lambda d: d.drop_vars("spin"), "lacks the variable spin; it was cut or averaged"),
     "averaged": (lambda d: d.mean("time", keep_attrs=True), "lacks the variable time and 1 other thing; it was cut"),
+    "bare": (lambda d: d.drop_attrs(), "not a dataset of sweep, or sweep_kind was dropped; keep it with"),
     "of nothing": (lambda d: d.isel(trajectory=slice(0)), "the axis trajectory has no values; select at least one"),
 }
 """What may be done to a dataset of trajectories."""
 
-FOREIGN: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
-    "title": (lambda d: d.assign_attrs(title=[1, 2]), "the attribute title is not text; another program"),
-    "verdict": (lambda d: d.assign_attrs(verdict=3), "the attribute verdict is not text; another program"),
-    "time": (lambda d: d.assign_attrs(wall_time="x"), "the attribute wall_time is not a number; another program"),
-    "words": (lambda d: d.assign(step=d.step.astype(str)), "the variable step holds no numbers; another program"),
-    "shape": (lambda d: d.assign(step=d.step.isel(mu=0)), "the variable step is not over the axes of status; another"),
-}
-"""Known names for other things, in a dataset of a run."""
 
-
-@pytest.mark.parametrize("change", [*CUTS, *FOREIGN])
-def test_a_changed_dataset_says_what_it_lacks_or_what_is_foreign(
-    change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    changed, said = (CUTS | FOREIGN)[change]
-    function = sweep.trajectory if change in CUTS else sweep.run
-    found = changed(function({"model": "averaged", "friction": {"mu": [50, 60]}}, t_end=20))
+@pytest.mark.parametrize("change", CUTS)
+def test_a_changed_dataset_says_what_it_lacks(change: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changed, said = CUTS[change]
+    found = changed(sweep.trajectory({"model": "averaged", "friction": {"mu": [50, 60]}}, t_end=20))
     monkeypatch.setattr("sweep.results.kind.open_dataset", lambda *_, **__: found)  # netCDF does not store all of them
     for verb in ("info", "plot"):
         refused(invoke(verb, tmp_path / "changed.nc"), f"changed.nc: {said}")

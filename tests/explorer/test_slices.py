@@ -85,7 +85,11 @@ def test_one_axis_is_a_row(opened: xr.Dataset) -> None:
     ("show", "change", "said"),
     [
         (Source, lambda _: xr.Dataset({"status": 0}), "open a dataset of run"),
-        (Source, lambda _: xr.Dataset({"status": (("trajectory", "sample"), [[0, 0]])}), "open a dataset of run"),
+        (
+            Source,
+            lambda _: xr.Dataset({"status": ("mu", [0, 0])}, attrs={"sweep_kind": "fit"}),
+            "open a dataset of run",
+        ),
         (Source, lambda whole: whole.rename(mu="show"), "the axis show has the name"),
         (sweep.explore, lambda whole: whole.isel(mu=slice(0, 0)), "the axis mu has no values"),
         (sweep.explore, lambda whole: whole.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),

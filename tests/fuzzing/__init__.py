@@ -6,15 +6,12 @@ of each kind with hypothesis, and among the campaigns many.
 """
 
 import os
-import warnings
 from collections.abc import Callable
-from itertools import count
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from click.testing import CliRunner
 
 from sweep.cli import main
@@ -181,64 +178,6 @@ def invoke(*line: str) -> int:
     return result.exit_code
 
 
-def _invoke(folder: Path, *arguments: str) -> bool:
-    """Run the command line, which writes nothing but the picture of `plot`."""
-    before = set(folder.rglob("*"))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        code = invoke(*arguments)
-    if written := sorted(set(folder.rglob("*")) - before, reverse=True):
-        for path in written:  # otherwise the same input would not fail again
-            path.rmdir() if path.is_dir() else path.unlink()
-        if code or written != [folder / "picture.png"]:
-            raise Violation(f"{arguments}: written: {written}")
-    return code == 0
-
-
-_FILES = count()
-
-
-def foreign(random: Random, folder: Path) -> bool:
-    """A dataset of another program, whose variables may have the same names as ours."""
-    names = ("status", "reversals", "reversals_predicted", "energy_error", "step_rule", "step",
-             "wall_time", "spin_final", "form_factor", "b", "mu", "temperature")  # fmt: skip
-    dims = {"b": 6, "mu": random.choice((0, 1, 7)), "time": random.choice((0, 3, 20)), "lat": 2}
-    odd: dict[str, Any] = {
-        "title": random.choice(("a", "$\\frac", "\x1b[2J", "é\nb", 3, [1, 2])), "flag_values": [1, 2],
-        "flag_meanings": "a b",
-        "units": random.choice(("days since 2000", "s", 3)), "wall_time": random.choice((1.0, "x")),
-        "scale_factor": random.choice((2.0, "x")),
-    }  # fmt: skip
-
-    def attributes() -> dict[str, Any]:
-        return {key: odd[key] for key in odd if random.random() < 0.15}
-
-    variables = {}
-    chosen = {*random.sample(names, random.randrange(len(names))), *random.choice((("status",), ()))}
-    for name in sorted(chosen):
-        over = tuple(random.sample(sorted(dims), random.randrange(4))) if name not in dims else (name,)
-        shape = tuple(dims[d] for d in over)
-        kind = random.choice(("int16", "float64", "float32", "int8", "U", "M8[ns]", "uint64"))
-        numbers = np.array([random.choice((0, 1, 2, 3, 7)) for _ in range(int(np.prod(shape)))]).reshape(shape)
-        filled = numbers.astype(kind)
-        if kind.startswith("float") and random.random() < 0.3:
-            filled = np.full(shape, random.choice((np.nan, np.inf)), kind)
-        variables[name] = (over, filled, {} if kind.startswith("M") else attributes())
-    file = folder / f"foreign{next(_FILES)}.nc"  # the ones before may be open still
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            xr.Dataset(variables, attrs=attributes()).to_netcdf(file, engine="netcdf4")
-        except (ValueError, TypeError):  # xarray itself does not write this one
-            return False
-    shown = _invoke(folder, "info", str(file))
-    if random.random() < 0.15:
-        variable = random.choice((None, "status", "mu", "spin_final", "form_factor", "nothing", "../x", ""))
-        named = () if variable is None else ("--var", variable)
-        shown &= _invoke(folder, "plot", str(file), "--output", str(folder / "picture.png"), *named)
-    return shown
-
-
 KINDS: dict[str, Callable[[Random, Path], bool]] = {
-    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, table, foreign)
+    kind.__name__: kind for kind in (yaml_tree, yaml_bytes, setting, mapping, table)
 }

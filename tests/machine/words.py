@@ -118,6 +118,5 @@ CUTS: dict[str, Callable[[xr.Dataset, str, Random], xr.Dataset]] = {
     "where": lambda dataset, *_: dataset.where(dataset["status"] > 1) if "status" in dataset else dataset,
     "squeeze": lambda dataset, *_: dataset.squeeze(),
     "one": lambda dataset, _, random: dataset[[random.choice([*dataset.data_vars])]],
-    "bare": lambda dataset, *_: dataset.drop_attrs(),
 }
 """What users do with datasets, along one of their dimensions."""

@@ -174,7 +174,7 @@ def test_given_axes_take_one_panel_of_one_run(small: xr.Dataset) -> None:
     with pytest.raises(ValueError, match="needs more than one panel; select"):
         picture.plot(small, ax=axes)
     with pytest.raises(ValueError, match="only a map or a curve of a run"):
-        picture.plot(xr.Dataset({"critical_reason": ("mu", [0, 0])}, {"mu": [1.0, 2.0]}), ax=axes)
+        picture.plot(small.assign_attrs(sweep_kind="critical"), ax=axes)
     assert not axes.has_data()
 
 
