@@ -23,6 +23,7 @@ FOREIGN = {
     "rich": {"progress"},
     "ruamel": {"config"},
     "scipy": {"config", "engine", "plots", "reproduce", "results", "studies"},
+    "trimesh": {"config"},
     "xarray": {"api", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies"},
 }  # fmt: skip
 """The rooms that import each package; NumPy is for all."""

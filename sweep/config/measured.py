@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sweep.config import meshes
 from sweep.config.values import instead
 from sweep.faults import either, fault_of, printable, refusal
-from sweep.models.general import meshes, solids
+from sweep.models.general import solids
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.units import SI, WRITTEN, Unit, named, quantity, unit_in
 
@@ -31,8 +32,8 @@ _SOLID = """\
 _SHAPE = """\
 # A homogeneous solid of the shape {file}, in millimetres ({sizes}) and z up, by `python -m sweep body` from
 #   {said}.
-# Its inertia is an integral over the tetrahedra of its triangles and a point, by the divergence theorem.  The ellipsoid
-# of a, b and c is fitted to the lowest tenth of its height, within {misfit:.2g} m.
+# Its inertia is integrated over its triangles by trimesh.  The ellipsoid of a, b and c is fitted to the lowest tenth
+# of its height, within {misfit:.2g} m.
 """
 _BODY = """\
 # The errors behind ± are to first order, for independent measurements; brackets hold mean and error of a normal
@@ -112,7 +113,7 @@ def of_shape(given: Given, file: Path) -> str:
     OSError
         if the file cannot be read.
     InputError
-        if more is given than a mass or a density, or if the shape is not closed or does not stand.
+        if more is given than a mass or a density, the shape is not closed or does not stand, or trimesh is missing.
     """
     _check_names(given, [_MASS])
     for name in [each for each in given if each not in _MASS]:

@@ -1,6 +1,7 @@
 """The commands `body` and `examples`: what they write runs as it is, and what they refuse is one line."""
 
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,8 @@ def half_ellipsoid(directions: int = 80, rings: int = 40, missing: int = 0, scal
     one, across = sheet[:-1, :-1], sheet[1:, 1:]
     halves = ((one, sheet[1:, :-1], across), (one, across, sheet[:-1, 1:]))
     corners = np.concatenate([np.stack(half, 2).reshape(-1, 3) for half in halves])[: -3 * missing or None] * scale
-    return "".join("vertex {:.9g} {:.9g} {:.9g}\n".format(*corner) for corner in corners)
+    vertices = "".join("vertex {:.9g} {:.9g} {:.9g}\n".format(*corner) for corner in corners)
+    return f"solid\n{vertices}endsolid\n"
 
 
 def test_a_shape_of_an_ellipsoid_is_the_body_of_its_sizes(tmp_path: Path) -> None:
@@ -77,6 +79,13 @@ def test_a_shape_of_an_ellipsoid_is_the_body_of_its_sizes(tmp_path: Path) -> Non
         assert found.get(name, 0.0) == pytest.approx(value, rel=3e-3), name
     assert "toy.stl, in millimetres (120 x 30 x 15)" in text
     assert re.search(r"mass: 0.0350?\d+  # ± 0.0028 kg", text)
+
+
+def test_a_shape_without_trimesh_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "toy.stl").write_text(half_ellipsoid(), encoding="utf-8")
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    said = "toy.stl: needs trimesh, which is not installed: pip install 'rattleback-sweep[mesh]'"
+    refused(invoke("body", "--stl", tmp_path / "toy.stl", "--mass", "30g"), said)
 
 
 def test_a_shape_takes_a_mass_or_a_density_alone(tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_the_time_axis_ends_a_while_after_the_last_event() -> None:
     turning, still = made([60, 100]), made([60])
     time = turning["time"]
     turning["ripple_free_spin"] = xr.DataArray([8.25, 17.75], dims="trajectory") - time
-    turning.attrs = {"model_brings": "a model"}
+    turning.attrs |= {"model_brings": "a model"}
     for dataset, end in ((turning, 1.4 * 17.75), (still, 100)):
         for axes in picture.plot(dataset).axes:
             assert axes.get_xlim() == (0, pytest.approx(end))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import ROOT
 
-from sweep.models.general import meshes
+from sweep.config import meshes
 
 PEBBLE = {"hull": (0.08, 0.04, 0.035), "thickness": 0.022, "outline": (0.12, 0.052), "turn": 0.09, "density": 2650.0}
 
@@ -50,7 +50,8 @@ def test_a_measured_mass_is_that_of_the_shape() -> None:
 def ascii_file(corners: np.ndarray) -> bytes:
     """Text, as most programs write it."""
     facets = ("".join("vertex {:.9e} {:.9e} {:.9e}\n".format(*corner) for corner in three) for three in corners)
-    return "".join(f"facet normal 0 0 0\nouter loop\n{facet}endloop\nendfacet\n" for facet in facets).encode()
+    text = "".join(f"facet normal 0 0 0\nouter loop\n{facet}endloop\nendfacet\n" for facet in facets)
+    return f"solid pebble\n{text}endsolid pebble\n".encode()
 
 
 def binary_file(corners: np.ndarray) -> bytes:
@@ -96,7 +97,7 @@ WRONG = {
     "leave holes: 280 edges have one triangle; repair": pebble()[:-200],
     "leave holes: 3 edges": pebble()[1:],
     "meet more than in twos at 57600 edges": np.concatenate([OUT, OUT]),
-    "face inwards at 3 edges": np.concatenate([OUT[:1, ::-1], OUT[1:]]),
+    "do not all face the same way": np.concatenate([OUT[:1, ::-1], OUT[1:]]),
     "overlap or are inside out in 1.. % of the volume": np.concatenate([OUT, box(CORE, MIDDLE)]),
     "are inside out in": np.concatenate([OUT, box(CORE, (0.3, -0.2, 1.1))[:, ::-1]]),
     "hold no volume": pebble() * [1, 1, 0],
@@ -111,7 +112,8 @@ def test_what_is_no_standing_solid_is_refused(words: str) -> None:
         meshes.mesh(WRONG[words])
 
 
-NO_STL = [b"", b"hello", b"vertex 1 2 3", *(b"vertex 1 2 %s\n" % z * 3 for z in (b"nan", b"1e200", b"1,5", b"\xb5"))]
+NO_STL = [b"", b"hello", b"solid\nvertex 1 2 3\nendsolid"]
+NO_STL += [b"solid\n%sendsolid" % (b"vertex 1 2 %s\n" % z * 3) for z in (b"nan", b"1e200", b"1,5", b"\xb5")]
 
 
 @pytest.mark.parametrize("data", NO_STL)

@@ -1,9 +1,10 @@
-"""A homogeneous solid inside triangles, as an STL file has them, and the ellipsoid that fits its lowest part."""
+"""Computes the solid inside the triangles of an STL file, and the ellipsoid that fits its lowest part."""
 
 from __future__ import annotations
 
-import re
+import warnings
 from dataclasses import dataclass
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -11,28 +12,33 @@ from numpy.typing import NDArray
 
 from sweep.models.general.solids import Numbers, mass_of
 
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_HEADER = 84
 _LARGEST = 1e9
 _LOWEST = 0.1
 """The share of the height in which the surface is fitted."""
-_SAME = 1e-6
-"""Distance below which corners count as the same, as a share of the longest size."""
+_DIGITS = 6
+"""Digits, as shares of the longest size, to which corners at the same place agree."""
 _LINES, _OVERLAP = 400, 1e-3
 """Lines along which shells are counted, and the share of the volume in which they may overlap."""
+
+
+def _trimesh() -> Any:
+    """Import trimesh; raise a ValueError that says what to install if it is missing."""
+    try:
+        import trimesh
+    except ModuleNotFoundError:
+        raise ValueError("needs trimesh, which is not installed: pip install 'rattleback-sweep[mesh]'") from None
+    return trimesh
 
 
 def triangles(stl: bytes) -> NDArray[np.float64]:
     """Return the corners in a binary or ASCII STL file, shape (triangles, 3, 3); a ValueError if the file is not
     one."""
-    if len(stl) >= _HEADER and len(stl) == _HEADER + _RECORD.itemsize * int.from_bytes(stl[80:_HEADER], "little"):
-        found = np.frombuffer(stl, _RECORD, offset=_HEADER)["corners"].astype(float)
-    else:
-        words = re.findall(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)", stl)
-        try:
-            found = np.array(words[: len(words) // 3 * 3]).astype(float).reshape(-1, 3, 3)
-        except ValueError:  # NumPy's words would be of bytes
-            found = np.empty(0)
+    load = _trimesh().load_mesh
+    try:
+        with warnings.catch_warnings(action="error"):  # NumPy warns of texts that are not numbers
+            found = np.array(load(BytesIO(stl), "stl", process=False).triangles)
+    except Exception:  # the errors that trimesh raises for other files are undocumented
+        found = np.empty(0)
     if not len(found) or not (np.abs(found) < _LARGEST).all():
         raise ValueError("not an STL file")
     return found
@@ -43,8 +49,8 @@ class Mesh:
     """A solid that stands on the plane, in the axes of `a` and `b` and downwards."""
 
     volume: float
-    second: NDArray[np.float64]
-    """Central second moments per mass, shape (3, 3)."""
+    inertia: NDArray[np.float64]
+    """Central moments of inertia per mass, shape (3, 3)."""
     surface: dict[str, float]
     """`a`, `b`, `c` and `offset`."""
     misfit: float
@@ -54,9 +60,8 @@ class Mesh:
 def mesh(corners: NDArray[np.float64]) -> Mesh:
     """Return the solid inside triangles with these corners, shape (triangles, 3, 3), z up; lengths in any unit.
 
-    Its integrals are sums over the tetrahedra of the triangles and one point, by the divergence theorem.  An ellipsoid
-    that touches the plane below the centre of mass has 2 h = k1 x² + 2 k12 x y + k2 y² + h²/c at the height h, with the
-    curvatures k there: its coefficients come from linear least squares.
+    An ellipsoid that touches the plane below the centre of mass has 2 h = k1 x² + 2 k12 x y + k2 y² + h²/c at the
+    height h, with the curvatures k there: its coefficients come from linear least squares.
 
     Raises
     ------
@@ -64,16 +69,16 @@ def mesh(corners: NDArray[np.float64]) -> Mesh:
         in words if the surface is not closed, if shells overlap, or if the solid does not stand on a rounded lowest
         point.
     """
+    properties = _trimesh().triangles.mass_properties
     corners = corners - corners.mean((0, 1))
-    volumes, sums = np.linalg.det(corners) / 6, corners.sum(1)
-    volume = volumes.sum()
-    if not abs(volume) > 1e-9 * np.ptp(corners, axis=(0, 1)).prod():
+    sizes = np.ptp(corners, axis=(0, 1))
+    if not abs(volume := properties(corners, center_mass=np.zeros(3)).volume) > 1e-9 * sizes.prod():
         raise ValueError("the triangles hold no volume")
-    _check_closed(corners)
-    _check_shells(corners if volume > 0 else corners[:, ::-1])
-    centre = volumes @ sums / 4 / volume
-    second = np.einsum("t,tki,tkj->ij", volumes, corners, corners) + (volumes * sums.T) @ sums
-    return _standing(abs(volume), second / 20 / volume - np.outer(centre, centre), corners.reshape(-1, 3) - centre)
+    _check_closed(corners / sizes.max())
+    outwards = corners if volume > 0 else corners[:, ::-1]
+    _check_shells(outwards)
+    found = properties(outwards)
+    return _standing(found.volume, found.inertia / found.volume, corners.reshape(-1, 3) - found.center_mass)
 
 
 def _check_closed(corners: NDArray[np.float64]) -> None:
@@ -82,32 +87,21 @@ def _check_closed(corners: NDArray[np.float64]) -> None:
     Corners at the same place may differ in their last digits.  They count as the same if they round to the same
     point of a grid, or of a shifted one, since few lie where both grids separate them.
     """
-    places = corners.reshape(-1, 3) / (_SAME * np.ptp(corners, axis=(0, 1)).max())
-    for shift in (0, 1 / 3, 2 / 3):
-        _, first, corner = np.unique(np.round(places + shift), axis=0, return_index=True, return_inverse=True)
-        places = places[first][corner]
-    found = _open_edges(corner.reshape(-1, 3))
-    words = (
-        "leave holes: {} edges have one triangle",
-        "meet more than in twos at {} edges",
-        "face inwards at {} edges",
-    )
-    if any(found):
-        wrong = ", ".join(each.format(count) for each, count in zip(words, found, strict=True) if count)
-        raise ValueError(f"the triangles {wrong}; repair the shape in the program that drew it")
-
-
-def _open_edges(corner: NDArray[np.int64]) -> tuple[int, int, int]:
-    """Count the edges, given by pairs of corner numbers, that do not belong to two triangles in opposite senses.
-
-    They belong to one triangle alone, to more than two, or to two that pass along them in the same sense.
-    """
-    corner = corner[(corner != np.roll(corner, 1, 1)).all(1)]  # triangles with two equal corners have no area
-    edges = np.stack([corner, np.roll(corner, -1, 1)], -1).reshape(-1, 2)
-    forward = edges[:, 0] < edges[:, 1]
-    _, which = np.unique(np.sort(edges, 1), axis=0, return_inverse=True)
-    all_, ahead = np.bincount(which), np.bincount(which, forward)
-    return int((all_ == 1).sum()), int((all_ > 2).sum()), int(((all_ == 2) & (ahead != 1)).sum())
+    trimesh = _trimesh()
+    solid = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners), process=False)
+    for _ in range(3):
+        solid.merge_vertices(digits_vertex=_DIGITS)
+        solid.apply_translation(np.full(3, 10.0**-_DIGITS / 3))
+    # Triangles with two equal corners have no area, and no edges that close anything.
+    solid.update_faces((solid.faces != np.roll(solid.faces, 1, axis=1)).all(axis=1))
+    _, times = np.unique(solid.edges_sorted, axis=0, return_counts=True)
+    holes, more = int((times == 1).sum()), int((times > 2).sum())
+    wrong = [f"leave holes: {holes} edges have one triangle"] if holes else []
+    wrong += [f"meet more than in twos at {more} edges"] if more else []
+    if not wrong and not solid.is_winding_consistent:
+        wrong = ["do not all face the same way"]
+    if wrong:
+        raise ValueError(f"the triangles {', '.join(wrong)}; repair the shape in the program that drew it")
 
 
 def _check_shells(corners: NDArray[np.float64]) -> None:
@@ -138,7 +132,7 @@ def _cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.f
     return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
 
 
-def _standing(volume: float, second: NDArray[np.float64], points: NDArray[np.float64]) -> Mesh:
+def _standing(volume: float, inertia: NDArray[np.float64], points: NDArray[np.float64]) -> Mesh:
     """Fit the surface to points around the centre of mass, and turn the axes."""
     bottom, height = points[:, 2].min(), np.ptp(points[:, 2])
     x, y, h = np.unique(points[points[:, 2] < bottom + _LOWEST * height], axis=0).T - [[0], [0], [bottom]]
@@ -155,13 +149,12 @@ def _standing(volume: float, second: NDArray[np.float64], points: NDArray[np.flo
     turn = np.array([[*along, 0], [along[1], -along[0], 0], [0, 0, -1]])
     surface = {"a": np.sqrt(c / curvatures[0]), "b": np.sqrt(c / curvatures[1]), "c": c, "offset": c - depth}
     misfit = np.abs(terms @ [k1, k12, k2, flat, *slope, shift] - 2 * h).max() / 2
-    return Mesh(volume, turn @ second @ turn.T, {name: float(each) for name, each in surface.items()}, float(misfit))
+    return Mesh(volume, turn @ inertia @ turn.T, {name: float(each) for name, each in surface.items()}, float(misfit))
 
 
 def body(solid: Mesh, measured: Numbers) -> dict[str, Any]:
     """Return the parameters of the section `body` for a solid whose `mass` or `density` is known, all in SI units."""
     mass = mass_of(measured, solid.volume)
-    matrix = np.trace(solid.second) * np.eye(3) - solid.second
     places = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
-    kept = {name: at for name, at in places.items() if abs(matrix[at]) > 1e-6 * matrix[2, 2]}
-    return solid.surface | {"mass": mass} | {name: mass * matrix[at] for name, at in kept.items()}
+    kept = {name: at for name, at in places.items() if abs(solid.inertia[at]) > 1e-6 * solid.inertia[2, 2]}
+    return solid.surface | {"mass": mass} | {name: mass * solid.inertia[at] for name, at in kept.items()}
