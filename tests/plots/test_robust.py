@@ -47,7 +47,9 @@ def critical(spins: dict[str, list[float]], reason: list[int], dim: str = "case"
     unknown = dict.fromkeys(CRITICAL.needs, [np.nan] * len(reason))
     reasons = {name: np.array(reason, "int8") for name in unknown if name.endswith("reason")}
     found: dict[str, Any] = {**unknown, **reasons, **spins}
-    return xr.Dataset({n: (dim, np.array(v), described(VARIABLES[n])) for n, v in found.items()}, coords)
+    return xr.Dataset(
+        {n: (dim, np.array(v), described(VARIABLES[n])) for n, v in found.items()}, coords, {"sweep_kind": "critical"}
+    )
 
 
 def words(figure: Figure) -> list[str]:
@@ -192,7 +194,7 @@ def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None
     empty = xr.Dataset(
         {name: ("point", np.zeros(0, int)) for name in POINTS},
         {name: ("point", np.zeros(0), axis) for name in ("n0", "mu")},
-        {"x": "n0", "y": "mu", "trajectories": 0},
+        {"sweep_kind": "boundaries", "x": "n0", "y": "mu", "trajectories": 0},
     )
     (axes,) = picture.plot(empty).axes
     assert axes.get_title() == "no boundary was found between the cells"

@@ -85,7 +85,7 @@ def test_curves_of_critical_spins_are_smooth_from_the_first_value_to_the_last() 
     for name in set(CRITICAL.needs) - set(dataset):
         dataset[name] = dataset["n_c1_plus"].astype("int8" if name.endswith("reason") else float)
     dataset["n_c2_plus_simulated"] = dataset["n_c2_plus"]
-    (axes,) = picture.plot(dataset).axes
+    (axes,) = picture.plot(dataset.assign_attrs(sweep_kind="critical")).axes
     for name in ("n_c1_plus_linear", "n_c2_plus"):
         (line,) = [each for each in axes.lines if each.get_gid() == name]
         mu = line.get_xdata()

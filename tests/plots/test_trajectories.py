@@ -30,7 +30,8 @@ def made(mu: list[float], **given: Any) -> xr.Dataset:
     constants = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "t_stop": 100.0} | given
     each = {name: ("trajectory", np.broadcast_to(v, len(mu))) for name, v in constants.items()}
     each |= {name: ("trajectory", v) for name, v in {"mu": bodies, **of_bodies}.items()}
-    dataset = xr.Dataset({**values, **each, "reversals": ("trajectory", np.full(len(mu), 3))}, {"time": time})
+    each["reversals"] = "trajectory", np.full(len(mu), 3)
+    dataset = xr.Dataset({**values, **each}, {"time": time}, {"sweep_kind": "trajectory"})
     dataset["status"] = "trajectory", np.full(len(mu), SETTLED)
     dataset["time"].attrs = {"long_name": "time t", "units": "sqrt(c/g)"}
     dataset["spin"].attrs = {"long_name": "spin n", "units": "sqrt(g/c)"}
