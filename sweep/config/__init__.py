@@ -14,8 +14,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from sweep import faults
-from sweep.config import cases, cross_checks, document, film, schema, user_models
-from sweep.config.configuration import FIRST_AXES, Config, film_in, model_of, present
+from sweep.config import cases, cross_checks, document, schema, user_models
+from sweep.config.configuration import FIRST_AXES, Config, model_of, present
 from sweep.config.distributions import chances, drawn
 from sweep.config.document import plain_data
 from sweep.config.messages import explain
@@ -116,8 +116,7 @@ def _source(config: ConfigLike) -> document.Document:
     if config.source:
         return deepcopy(config.source)
     values = config.document()
-    known: dict[tuple[str, str], Any] = {("film", config.film_file): config.film}
-    known["model", config.model] = config.origin
+    known: dict[tuple[str, str], Any] = {("model", config.model): config.origin}
     if config.cases_file:
         known["cases", config.cases_file] = config.cases, {}
     return document.Document("", values, known=known)
@@ -139,7 +138,6 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     if values.cases is not None:  # it may be ""
         columns, units = cases.read(source, known)
         units_of_cases = {("cases", name): unit for name, unit in units.items() if unit}
-    seen = film_in(values.measure or ())
     physics = _physics(values, origin, frozenset((*present(given), *columns)))
     _refuse(source, cross_checks.of_physics(values, physics, origin))
     model = model_of(values.model, origin, physics)
@@ -162,7 +160,6 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         cases_file=values.cases,
         samples=samples,
         seed=values.seed,
-        film=source.once("film", seen, lambda: film.read(Path(source.file).parent / seen)) if seen else None,
         units=physics.units,
         law=physics.law.name,
         surface=physics.surface.name,

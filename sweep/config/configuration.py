@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
@@ -15,12 +15,10 @@ from ruamel.yaml.compat import StringIO
 
 from sweep.config.distributions import Distribution
 from sweep.config.document import Document
-from sweep.config.film import Film
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.faults import InputError, Path
 from sweep.grid import CASE, SAMPLE, Grid
-from sweep.kernels.measures.misfit import Misfit
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
@@ -34,11 +32,6 @@ from sweep.variables import attributes
 
 # Maps are drawn with μ down, b across and one panel per n0. Other axes follow in the order of the configuration.
 FIRST_AXES = ("mu", "b", "n0")
-
-
-def film_in(measure: Iterable[str]) -> str:
-    """Return the name of the film to compare with, as given in the configuration; "" if there is none."""
-    return next((spec.partition("=")[2] for spec in measure if spec.startswith(f"{Misfit.name}=")), "")
 
 
 def model_of(name: str, origin: Origin | None, physics: Physics) -> Tier:
@@ -80,8 +73,6 @@ class Config:
     samples: int | None = None
     """Number of samples drawn from the distributions, if there are any."""
     seed: int = 0
-    film: Film | None = None
-    """The film with which the misfit is computed."""
     units: str = PAPER_UNITS
     law: str = PAPER_LAW
     """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
@@ -145,10 +136,6 @@ class Config:
         names = frozenset((*present(self.parameters), *self.cases))
         law = self.own_law or laws.LAWS[self.law]
         return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
-
-    @property
-    def film_file(self) -> str:
-        return film_in(self.measure)
 
     @property
     def simulated(self) -> bool:
@@ -222,10 +209,7 @@ class Config:
             **({"samples": self.samples, "seed": self.seed} if self.samples else {}),
             **{key: values for key, values in found.items() if values != {}},
             "integrator": self.integrator.model_dump(),
-            "measure": [
-                {name: n if name == Misfit.name else int(n)} if n else name
-                for name, _, n in (m.partition("=") for m in self.measure)
-            ],
+            "measure": [{name: int(n)} if n else name for name, _, n in (m.partition("=") for m in self.measure)],
             **({"picture": list(self.picture)} if self.picture else {}),
             "max_failed_fraction": self.max_failed_fraction,
         }
@@ -250,8 +234,7 @@ class Config:
         # The content of a model file counts, through its SHA-256, and not its location.
         for key in ("name", "max_failed_fraction", "picture", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
-        seen = [self.film.sha256] if self.film else []
-        text = json.dumps([decisive, list(self.axes), self.cases or None, *seen], sort_keys=True)
+        text = json.dumps([decisive, list(self.axes), self.cases or None], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

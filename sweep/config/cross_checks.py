@@ -19,7 +19,6 @@ from sweep.faults import Path, either
 from sweep.grid import BODY, Array, distinct
 from sweep.kernels import measures, methods
 from sweep.kernels.differentiate import undifferentiable
-from sweep.kernels.measures import misfit
 from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general import starts, validity
 from sweep.models.general.surfaces import SURFACES
@@ -132,11 +131,6 @@ def _unmeasurable(name: str, config: Config) -> Iterator[str]:
     if TANGENT in kind.follows and method and not method.takes_every_step:
         able = either(each for each, found in methods.METHODS.items() if found.takes_every_step)
         yield f"{name} cannot be measured with method: {method.name}; choose {able}"
-    elif kind is misfit.Misfit and config.film:
-        if config.film.what != "spin":
-            yield f"the film {config.film_file} shows a {config.film.what}, but a misfit needs a spin; use sweep fit"
-        if reason := unlike(config, config.film):
-            yield f"the film {config.film_file} {reason}"
     elif TANGENT in kind.follows and isinstance(model, Model) and (reason := undifferentiable(model)):
         yield f"{name} cannot be measured on the {model.name} model: {reason}; leave it out"
 

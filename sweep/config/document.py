@@ -46,7 +46,7 @@ class Document:
     arguments: dict[Path, tuple[str, Path]] = field(default_factory=dict)
     """For each value or section set by an argument: the argument, and the path that it set."""
     known: dict[tuple[str, str], Any] = field(default_factory=dict)
-    """Contents of the files named in the document (a table of cases, a film, a model), by key and name, once read."""
+    """Contents of the files named in the document (a table of cases, a model), by key and name, once read."""
 
     def once(self, key: str, name: str, read: Callable[[], Any]) -> Any:
         """Return the contents of the file `name`, read once for everything made from this document."""

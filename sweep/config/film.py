@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import get_args
 
@@ -66,15 +64,6 @@ class Film:
     def errors(self) -> Array:
         """Return the standard errors, or ones if the film does not give them."""
         return np.ones_like(self.time) if self.error is None else self.error
-
-    @cached_property
-    def sha256(self) -> str:
-        """Return a hash of everything that determines a misfit."""
-        rows = np.stack([self.time, self.value, self.errors])
-        return hashlib.sha256(rows.tobytes() + self.what.encode()).hexdigest()
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Film) and self.sha256 == other.sha256
 
 
 def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film:

@@ -13,7 +13,6 @@ from sweep.config.messages import Allowed, wrong
 from sweep.config.values import MAX_AXIS, Strict, Whole, in_si, parse_values, whole
 from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
-from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
@@ -41,10 +40,6 @@ def _measure(raw: Any, i: int) -> str:
     if not isinstance(name, str) or name not in MEASURES:
         raise wrong(refusal(name, either(MEASURES), MEASURES), i)
     kind = MEASURES[name]
-    if kind is Misfit:
-        if not isinstance(setting, str):
-            raise wrong("misfit needs a film; write {misfit: film.csv}", i)
-        return f"{name}={setting}"
     if not isinstance(raw, dict):
         return kind().spec
     if kind.bounds is None:

@@ -74,7 +74,6 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     # In a user-defined model, `model_sha256` identifies what `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
-    changed |= {"film"} if config.film and there.attrs.get("film_sha256", "") not in ("", config.film.sha256) else set()
     less = [each for each in old["measure"] if each not in new["measure"]]
     sooner = new["integrator.t_end"] < old["integrator.t_end"]
     kept = (_match(config.grid, _grid(there)) >= 0).sum()

@@ -15,7 +15,7 @@ from sweep.engine.plan import choose, kernels
 from sweep.faults import duration
 from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing
-from sweep.kernels.methods import METHODS, PLAIN, automatic_step
+from sweep.kernels.methods import METHODS
 from sweep.models import MODELS
 from sweep.models.user.blame import blamed
 
@@ -70,6 +70,4 @@ def _works(config: Config, chosen: tuple[Cells, ...], steps: list[Array], share:
         method = METHODS[each.method]
         work = method.step_cost * relative * (theirs + method.start_up_cost)
         work *= 1 + 1 / method.companion if config.integrator.estimate_errors else 1
-        if config.film:
-            work += relative * config.film.time[-1] / automatic_step(PLAIN, config.equations, each.columns)[0]
         yield np.resize(work, round(len(work) * share))

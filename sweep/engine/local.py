@@ -11,7 +11,6 @@ import numpy as np
 from sweep.config import Config
 from sweep.engine.errors import results
 from sweep.engine.life import begin, live, progress
-from sweep.engine.misfits import misfits
 from sweep.engine.plan import plan
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
@@ -68,7 +67,7 @@ def run_batch(
 
     live(lives, report)
     job = replace(job, parts=tuple(each.cells for each in lives))
-    found = results(job, lives) | misfits(job)
+    found = results(job, lives)
     cost = {"seconds": np.array((time.perf_counter() - began) / len(batch)), "cpu": cpu}
     for i, arrays in zip(batch, job.by_grid(found), strict=True):
         yield i, arrays | cost

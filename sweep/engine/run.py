@@ -55,8 +55,6 @@ def run(
     dataset.check_names(config)
     quantities.check_pictures(config)
     reporter, identity = reporter or Reporter(), identify(config)
-    if config.film and config.film.omitted:
-        reporter.note(config.film.omitted)
     if output is None:
         with connected(client) as there:
             return _compute(config, Store(), reporter, there).dataset()

@@ -2,9 +2,9 @@
 
     python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
 
-A PIECE is `kernel`, or another part that runs need: `images` and `endings`, `samples` for a misfit, `path` for single
-trajectories, `approach` once a trajectory has failed, and `exchange` and `follow` for foreseen counts.  For a user's
-model, MODEL is "name@digest", and the record of its origin comes as a line of standard input.
+A PIECE is `kernel`, or another part that runs need: `images` and `endings`, `path` for single trajectories, `approach`
+once a trajectory has failed, and `exchange` and `follow` for foreseen counts.  For a user's model, MODEL is
+"name@digest", and the record of its origin comes as a line of standard input.
 
 Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
 functions that a kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of
@@ -29,10 +29,8 @@ from sweep.jit import Cached, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.measures.foreseen import Foreseen
-from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
-from sweep.kernels.samples import compiled_samples
 from sweep.models import find
 from sweep.models.model import ENDING, Model
 from sweep.models.origin import Origin
@@ -44,14 +42,13 @@ from sweep.models.user.blame import blamed
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and the origin of the model."""
 
-KERNEL, IMAGES, ENDINGS, SAMPLES, PATH, APPROACH = "kernel", "images", "endings", "samples", "path", "approach"
+KERNEL, IMAGES, ENDINGS, PATH, APPROACH = "kernel", "images", "endings", "path", "approach"
 _EXCHANGE, _FOLLOW = "exchange", "follow"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
     IMAGES: lambda kernel: kernel.stepper.filling(),
     ENDINGS: lambda kernel: (compiled_following(),) if ENDING in kernel.model.offers else (),
-    SAMPLES: lambda kernel: (compiled_samples(kernel.model, "spin"),),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),
     _EXCHANGE: lambda kernel: (compiled_exchange(kernel.model),),
@@ -59,7 +56,7 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, SAMPLES: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
+_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _POLL = 0.05
@@ -119,8 +116,7 @@ def try_compiling(model: Model) -> None:
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
     foreseen = [_EXCHANGE, _FOLLOW] if Foreseen.name in kernel.measure else []
-    samples = [SAMPLES] if Misfit.name in kernel.measure else []
-    return _lacking(kernel, (*foreseen, KERNEL, IMAGES, ENDINGS, *samples, *also))
+    return _lacking(kernel, (*foreseen, KERNEL, IMAGES, ENDINGS, *also))
 
 
 def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]:

@@ -52,7 +52,7 @@ COMPARISONS = {"difference": DERIVED["difference"].needs, "ratio": DERIVED["rati
 """The simulated variable and the prediction that each compares, which their figures show as well."""
 
 _SUBJECTS = (
-    "misfit", "probability", "reversals", "reversals_predicted", "t_first_reversal", "lyapunov", "spin_final",
+    "probability", "reversals", "reversals_predicted", "t_first_reversal", "lyapunov", "spin_final",
 )  # fmt: skip
 """Possible subjects of a dataset, in order of preference."""
 

@@ -11,14 +11,13 @@ from sweep.config import Config, load_config
 from sweep.config.document import parse_value
 from sweep.faults import fault_of
 from sweep.grid import CASE
-from sweep.kernels.measures.misfit import Misfit
 from sweep.results.kind import RUN, TRAJECTORY, kind, parameters
 
 
 def configuration(
     dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
 ) -> Config:
-    """Return the configuration of a dataset, or of the part of it that was selected, without its film.
+    """Return the configuration of a dataset, or of the part of it that was selected.
 
     A table of cases, or of trajectories, is replaced by its first one.
 
@@ -36,8 +35,6 @@ def configuration(
     if not isinstance(values, dict):
         raise fault_of("a configuration is a mapping of keys to values", "config")
     cases = values.pop("cases", None)
-    if isinstance(measure := values.get("measure"), list):
-        values["measure"] = [each for each in measure if not (isinstance(each, dict) and Misfit.name in each)]
     selected = _selected(dataset, values, of_table=cases is not None)
     named = dict(model or {})
     return load_config(

@@ -20,7 +20,7 @@ import llvmlite.binding
 import numba
 
 from sweep.config import Config
-from sweep.faults import FileError, either, printable
+from sweep.faults import FileError, printable
 from sweep.jit import vector_bits
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.results import kind
@@ -30,10 +30,6 @@ _PACKAGE = Path(__file__).parent.parent
 
 _SHOWING = {"plots", "explorer", "cli", "report", "reproduce", "bench"}
 """Packages that only request or show numbers."""
-
-
-_UNSEEN = {"cases": "the table of cases", "misfit": "the film"}
-"""Inputs that a configuration names but does not contain, by key."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +52,8 @@ class Identity:
             old, new = (c.config.splitlines() for c in (self, other))
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
-            unseen = [name for key, name in _UNSEEN.items() if re.search(rf"\b{key}: ", other.config)]
-            changed = changed or [f"{either(unseen or ['the order of the axes'])} differs"]
+            of_cases = re.search(r"^cases: ", other.config, re.MULTILINE)
+            changed = changed or [f"the {'table of cases' if of_cases else 'order of the axes'} differs"]
             return "another configuration:\n  " + "\n  ".join(changed)
         if self.versions != other.versions:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
@@ -109,7 +105,6 @@ def provenance(
         **vars(identify(config)),
         "measured": " ".join(config.measure),
         **({"pictured": " ".join(config.picture)} if config.picture else {}),
-        **({"film_sha256": film.sha256, "film_instants": len(film.time)} if (film := config.film) else {}),
         **_brought(config),
         "integrator": _integrator_words(config),
         "sweep_version": metadata.version("rattleback-sweep"),

@@ -188,11 +188,6 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
-    if "misfit" in dataset and np.isfinite(dataset["misfit"]).any():
-        least = dataset["misfit"].isel(dataset["misfit"].argmin(...))
-        where = ", ".join(f"{name} = {least[name].item():g}" for name in dataset["misfit"].dims)
-        bound, at = (" at least", f", at {where}") if where else ("", "")
-        yield f"misfit: {least.item():.6g}{bound}, of {dataset.attrs.get('film_instants', '?')} instants{at}"
 
 
 def _doubts(dataset: xr.Dataset, valid: np.ndarray) -> Iterator[str]:

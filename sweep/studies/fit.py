@@ -23,7 +23,6 @@ from sweep.config.film import Film
 from sweep.faults import brief, counted, fault_of, suggestion
 from sweep.grid import BODY, Array
 from sweep.interrupt import deferred
-from sweep.kernels.measures.misfit import Misfit
 from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.kind import FIT
@@ -297,8 +296,4 @@ def _ends(problem: Problem, limits: Array) -> Array:
 def _with(config: Config, values: Mapping[str, float]) -> Config:
     """Return `config` with these values of its parameters."""
     fixed = {name: Values.one(value) for name, value in values.items() if name not in UNKNOWNS}
-    # The path to the film of a misfit would no longer hold.
-    measure = tuple(spec for spec in config.measure if spec.partition("=")[0] != Misfit.name)
-    return replace(
-        config, name=f"{config.name}_fit", parameters=config.parameters | fixed, measure=measure, film=None
-    )  # fmt: skip
+    return replace(config, name=f"{config.name}_fit", parameters=config.parameters | fixed)

@@ -50,13 +50,12 @@ def measuring(config: Config) -> Config:
     """Return `config` with the measurements that a search needs; margins are those of cells that settle.
 
     Next to a boundary many cells exceed the tolerance however short the steps are, so none is repeated. Other default
-    measurements stay, so that both share one kernel, which takes longer to compile than a search. A film does not:
-    every cell would be followed along it once more.
+    measurements stay, so that both share one kernel, which takes longer to compile than a search.
     """
     usual = default(config.equations)
     measure = tuple(spec for spec in usual if spec in _NEEDED or spec in config.measure)
     integrator = config.integrator.model_copy(update={"stop_early": config.integrator.stop_early or True})
-    return replace(config, measure=measure, film=None, repeats=False, integrator=integrator)
+    return replace(config, measure=measure, repeats=False, integrator=integrator)
 
 
 def require_certain(config: Config) -> None:

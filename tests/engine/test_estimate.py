@@ -5,7 +5,7 @@ from typing import Any
 from unittest.mock import patch
 
 import pytest
-from support import STANDARD, Write
+from support import STANDARD
 
 import sweep
 from sweep.engine.estimate import estimate
@@ -25,9 +25,8 @@ def told(what: str, **settings: Any) -> float:
 
 
 @pytest.mark.parametrize("name", MEASURES)
-def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch, write: Write) -> None:
-    film = {name: write("time,spin\n" + "".join(f"{t},{0.05 - t / 1000}\n" for t in range(9)), "film.csv")}
-    measure = [*MEASURES[name].needs, film if name == "misfit" else name]
+def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure = [*MEASURES[name].needs, name]
     for each in (*MEASURES[name].needs, name):
         monkeypatch.setattr(MEASURES[each], "cost", 1.0)
     alone = told("compute", measure=measure)

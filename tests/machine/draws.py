@@ -279,5 +279,5 @@ def further(random: Random) -> Iterator[set[Piece]]:
         base = shipped()[random.choice(sorted(shipped()))]
         drawn = {path: setting(path, random.randrange(1000)) for path in random.sample(sorted(PATHS), 4)}
         _, config = accepted(base | drawn)
-        if config.simulated and not config.film:
+        if config.simulated:
             yield kernels(config)

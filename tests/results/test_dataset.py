@@ -18,7 +18,7 @@ from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.writing import replacing
 
 NOT_BY_DEFAULT = """method t_first_reversal t_first_reversal_predicted cycle_mean cycle_variation lyapunov
-lyapunov_error misfit reversal_times raw_reversals reversals_foreseen foreseen_sure"""
+lyapunov_error reversal_times raw_reversals reversals_foreseen foreseen_sure"""
 
 
 def test_dataset_is_labelled(small: xr.Dataset) -> None:

@@ -12,7 +12,6 @@ from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.lyapunov import Lyapunov
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
-from sweep.kernels.measures.misfit import Misfit
 from sweep.kernels.measures.noise import NoiseLimited
 from sweep.kernels.measures.raw_reversals import RawReversals
 from sweep.kernels.measures.resting_spin import RestingSpin
@@ -22,7 +21,7 @@ from sweep.models.model import Model, Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
     Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Cycles,
-    Lyapunov, Misfit, Foreseen,
+    Lyapunov, Foreseen,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
@@ -33,7 +32,7 @@ def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
     settings = {name: value for name, _, value in (spec.partition("=") for spec in specs)}
     found = {name: kind for name, kind in MEASURES.items() if name in settings}
     return tuple(
-        kind(int(settings[name])) if kind.bounds and settings[name] else kind()  # type: ignore[call-arg]
+        kind(int(settings[name])) if settings[name] else kind()  # type: ignore[call-arg]
         for name, kind in found.items()
     )
 
