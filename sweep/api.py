@@ -502,7 +502,7 @@ def indices(
 def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     """Return the predictions of the paper and of the linear theory on the grid of `config`, without simulating.
 
-    If `first_reversal` is measured, the time of the first reversal is predicted as well.
+    If `reversal_times` are measured, the time of the first one is predicted as well.
 
     Parameters
     ----------

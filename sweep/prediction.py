@@ -10,8 +10,9 @@ import numpy as np
 from sweep.grid import Array, Grid
 from sweep.jit import on_all_threads, threads
 from sweep.kernels.build import build_foreseen
-from sweep.kernels.measures.first_reversal import FirstReversal
+from sweep.kernels.measures import chosen
 from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
@@ -46,8 +47,8 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
 
     Parameters
     ----------
-    measure : the measurements to be predicted: the time of the first reversal if "first_reversal" is among them, and
-        the count by the slow equations if "foreseen" is, or for their own model "reversals"
+    measure : specs of the measurements to be predicted: the time of the first reversal if "reversal_times" is among
+        them, and the count by the slow equations if "foreseen" is, or for their own model "reversals"
     """
     found = _formulas(tier, grid)
     if tier is slow.MODEL and Reversals.name in measure:
@@ -59,22 +60,25 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     n_c1 = ranges[1::-1]
     if LINEAR in tier.offers or not tier.origin:
         found["n_c1_plus_linear"], found["n_c1_minus_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan)
-    if REVERSAL_TIME in tier.offers and FirstReversal.name in measure:
-        found |= _reversal_time(tier, grid.columns(), n_c1[:, place])
+    if REVERSAL_TIME in tier.offers and any(isinstance(each, ReversalTimes) for each in chosen(measure)):
+        found["t_first_reversal_predicted"] = _first_reversal(tier, grid.columns(), n_c1[:, place])
     if Foreseen.name in measure:
         found |= foreseen(tier, grid.columns())
     return Prediction(found, n_c1, ranges[:, place])
 
 
-def _reversal_time(model: Model, columns: Columns, n_c1: Array) -> dict[str, Array]:
-    """Only slip makes the spin of a body without couples critical."""
-    time, reason = np.full(n_c1.shape[1], np.nan), np.full(n_c1.shape[1], reversal_time.NOT_KNOWN)
+def _first_reversal(model: Model, columns: Columns, n_c1: Array) -> Array:
+    """Predict the time of the first reversal, shape (cells,).
+
+    Only slip makes the spin of a body without couples critical.
+    """
+    time = np.full(n_c1.shape[1], np.nan)
     possible = np.flatnonzero(~model.impossible(columns))
     upper, lower = n_c1[:, possible] if "mu" in model.parameters else np.zeros((2, len(possible)))
     surface = model.variant.surface if model.variant else ELLIPSOID
     theirs = {name: values[possible] for name, values in columns.items()}
-    time[possible], reason[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
-    return {"t_first_reversal_predicted": time, "reversal_time_reason": reason}
+    time[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
+    return time
 
 
 def foreseen(model: Model, columns: Columns, *, check: bool = True) -> dict[str, Array]:

@@ -108,7 +108,8 @@ class Source:
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:
         """Read the map of a variable over `x` and `y`, at an index of each other axis; a row if `y` is empty."""
-        part = self.dataset.isel({d: at.get(d, 0) for d in self.axes if d not in (x, y)})
+        chosen = {*self.dims, *self.dims_of(name)} - {x, y}
+        part = self.dataset.isel({d: at.get(d, 0) for d in chosen})
         return describe(part, name, x, y)
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:

@@ -28,7 +28,7 @@ WORDS = {
 BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
 
-_GROWING = {"reversals", "raw_reversals", "t_last_reversal", "difference"}
+_GROWING = {"reversals", "t_last_reversal", "difference"}
 """Variables that a longer trajectory can only raise (in a difference, the simulated count)."""
 
 _PER_VARIABLE = {

@@ -25,7 +25,7 @@ class Derived:
     """A quantity computed from the variables of a dataset."""
 
     needs: tuple[str, ...]
-    """The variables from which it is derived."""
+    """The variables and dimensions from which it is derived."""
     derive: Callable[[xr.Dataset], xr.DataArray]
 
 
@@ -35,20 +35,30 @@ def _difference(dataset: xr.Dataset) -> xr.DataArray:
     return found.rename("difference").assign_attrs(long_name=f"{labels.origin(dataset, 'reversals')} − predicted")
 
 
+def _first(dataset: xr.Dataset) -> xr.DataArray:
+    times = dataset["reversal_times"]
+    found = times.isel(reversal=0, drop=True).where(times["reversal"].values[0] == 1)
+    return found.rename("t_first_reversal").assign_attrs(long_name="time of the first reversal")
+
+
 def _ratio(dataset: xr.Dataset) -> xr.DataArray:
-    found = dataset["t_first_reversal"] / dataset["t_first_reversal_predicted"]
+    found = _first(dataset) / dataset["t_first_reversal_predicted"]
     return found.rename("ratio").assign_attrs(long_name="first reversal, simulated / predicted", units="1")
 
 
 DERIVED = {
     "difference": Derived(("reversals", "reversals_predicted"), _difference),
-    "ratio": Derived(("t_first_reversal", "t_first_reversal_predicted"), _ratio),
+    "t_first_reversal": Derived(("reversal_times", "reversal"), _first),
+    "ratio": Derived(("reversal_times", "reversal", "t_first_reversal_predicted"), _ratio),
     "regime": Derived(regimes.NEEDS, regimes.regimes),
 }
-"""`difference`: simulated minus predicted reversals; `ratio`: time of the first reversal, simulated divided by
-predicted; `regime`: see `sweep.plots.regimes`."""
+"""`difference`: simulated minus predicted reversals; `t_first_reversal`: the first of `reversal_times`; `ratio`: that
+time divided by the predicted one; `regime`: see `sweep.plots.regimes`."""
 
-COMPARISONS = {"difference": DERIVED["difference"].needs, "ratio": DERIVED["ratio"].needs}
+COMPARISONS = {
+    "difference": ("reversals", "reversals_predicted"),
+    "ratio": ("t_first_reversal", "t_first_reversal_predicted"),
+}
 """The simulated variable and the prediction that each compares, which their figures show as well."""
 
 _SUBJECTS = (
@@ -60,7 +70,7 @@ _SUBJECTS = (
 def derivable(dataset: xr.Dataset) -> list[str]:
     """The quantities that can be derived from the variables of a dataset, whose status must still be a code."""
     coded = "status" in dataset and labels.is_code(dataset["status"])
-    there = {str(name) for name in dataset.data_vars if name != "status" or coded}
+    there = {str(name) for name in (*dataset.data_vars, *dataset.dims) if name != "status" or coded}
     return [name for name, derived in DERIVED.items() if set(derived.needs) <= there]
 
 

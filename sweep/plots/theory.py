@@ -16,7 +16,7 @@ from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
 from sweep.plots import fine
 
-REVERSALS = ("reversals", "reversals_foreseen", "reversals_predicted", "difference", "raw_reversals")
+REVERSALS = ("reversals", "reversals_foreseen", "reversals_predicted", "difference")
 """The variables that theory explains."""
 
 _SOURCES = {

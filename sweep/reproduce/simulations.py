@@ -15,6 +15,7 @@ from sweep.engine.run import run
 from sweep.kernels.measures import possible
 from sweep.models import MODELS, TIERS
 from sweep.models.ladder import analytic
+from sweep.plots.quantities import with_derived
 from sweep.plots.trajectories import draw_spin
 from sweep.report.direct import standard
 from sweep.report.rows import Section, against, states
@@ -180,11 +181,11 @@ def count_against_shape() -> Section:
 def ladder() -> Section:
     """Measure how good each reduced model is: counts, reversal times and cost compared with the full model."""
     mu, b = np.linspace(20, 200, 19), np.linspace(1.5, 9.0, 16)
-    measure = ("reversals", "first_reversal")
+    measure = ("reversals", "reversal_times")
     maps = {}
     for name in (*MODELS, "slow", "analytic"):
         run(configure(name, t_end=10.0, measure=measure, mu=mu[:1], b=b[:1]))  # compiles
-        maps[name] = run(configure(name, t_end=15_000.0, measure=measure, mu=mu, b=b))
+        maps[name] = with_derived(run(configure(name, t_end=15_000.0, measure=measure, mu=mu, b=b)))
     full = maps["slip"]
     errors = (f"error of the {which} reversal (median)" for which in ("first", "last"))
     lines = [["model", "equal counts", "within one", *errors, "trajectories/s"]]

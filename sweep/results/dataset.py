@@ -15,7 +15,6 @@ from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
-from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.units import NUMBER, PAPER_UNITS, SPIN, TIME
@@ -87,9 +86,9 @@ VARIABLES: dict[str, Variable] = {
     "reversals_predicted": Variable("int16", NUMBER, "spin reversals, predicted (Takano 2011)",
                                     "Spin reversals predicted by Takano (2011), cases (I) and (II)."),
     "t_first_reversal_predicted": Variable("float64", TIME, "first reversal, predicted (Garcia–Hubbard)",
-                                           "Time of the first spin reversal predicted by Garcia and Hubbard (1988)."),
-    "reversal_time_reason": _flag("is the first reversal predicted?", reversal_time.REASONS,
-                                  "Whether the first reversal is predicted, and if not, why."),
+                                           "Time of the first spin reversal predicted by Garcia and Hubbard (1988); "
+                                           "missing where nothing drives a reversal, where friction stops it, or where "
+                                           "their formula does not cover the body."),
     **{
         f"{name}_{side}{suffix}": _critical(name, side, source, by)
         for name, suffix, source, by in (

@@ -22,7 +22,7 @@ from sweep.studies.study import Task, require_simulated
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
-QUANTITIES = ("reversals", "t_first_reversal", "t_last_reversal", "spin_mean")
+QUANTITIES = ("reversals", "t_last_reversal", "spin_mean")
 """The results whose indices are computed, if they are measured."""
 
 _RESAMPLED = 400

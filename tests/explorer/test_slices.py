@@ -121,7 +121,8 @@ def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
 def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Dataset, low: float) -> None:
     from sweep.explorer import style
 
-    source = Source(opened.assign(t_first_reversal=opened["b"], t_first_reversal_predicted=2 * opened["mu"]))
+    times = opened["b"].expand_dims(reversal=[1])
+    source = Source(opened.assign(reversal_times=times, t_first_reversal_predicted=2 * opened["mu"]))
     part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
     scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
     assert style.mapping(scales[0]) == style.mapping(scales[1])

@@ -12,12 +12,12 @@ from support.physics import KANE_LEVINSON
 import sweep
 from sweep.models import find
 from sweep.models.general import rigid_body
-from sweep.models.general.reversal_time import NOT_KNOWN, REASONS, energies, first_reversal, growth
+from sweep.models.general.reversal_time import energies, first_reversal, growth
 from sweep.models.theory import linear
 
 ANGLES = {"roll": 0.01, "pitch": -0.02, "omega1": 0.3, "omega2": -0.1, "omega3": -1.0}
 NO_SLIP = np.zeros(1), np.zeros(1)
-FIRST = ["reversals", "first_reversal"]
+FIRST = ["reversals", {"reversal_times": 1}]
 
 
 def bodies() -> dict[str, tuple[str, dict[str, np.ndarray]]]:
@@ -79,39 +79,40 @@ def test_the_time_is_that_of_the_three_variable_equations(side: int, n_c: float)
 
     vanishes.terminal = True  # type: ignore[attr-defined]
     solution = solve_ivp(slopes, (0, 1e5), [0.05 * side, np.log(E)], "DOP853", rtol=1e-12, atol=1e-14, events=vanishes)
-    (found,), _ = first_reversal(body, (np.array([n_c]), np.array([-n_c])))
+    (found,) = first_reversal(body, (np.array([n_c]), np.array([-n_c])))
     assert found == pytest.approx(solution.t[-1], rel=1e-9)
 
 
 def test_the_mirror_image_reverses_at_the_same_time() -> None:
     for delta, n0 in ((0.03, 0.05), (0.3, -0.2)):
-        one, other = (first_reversal(columns(delta=s * delta, n0=s * n0, y0=s * 0.02), NO_SLIP)[0][0] for s in (1, -1))
+        one, other = (first_reversal(columns(delta=s * delta, n0=s * n0, y0=s * 0.02), NO_SLIP)[0] for s in (1, -1))
         assert one == pytest.approx(other, rel=1e-13)
 
 
 @pytest.mark.parametrize(
-    ("model", "given", "reason"),
+    ("model", "given", "predicted"),
     [
-        ("noslip", {}, "predicted"),
-        ("noslip", {"delta": 0.0}, "no_coupling"),
-        ("noslip", {"b": 10.0}, "no_coupling"),
-        ("noslip", {"n0": 0.0}, "no_spin"),
-        ("noslip", {"x0": 0.0, "y0": 0.0}, "no_rattle"),
-        ("noslip", {"sigma": 1e-4}, "not_known"),
-        ("noslip", {"offset": 0.3}, "predicted"),
-        ("slip", {"mu": 100.0}, "predicted"),
-        ("slip", {"mu": 100.0, "n0": 0.002}, "no_reversal"),
-        ("slip", {"mu": 0.0}, "not_known"),
+        ("noslip", {}, True),
+        ("noslip", {"delta": 0.0}, False),  # nothing couples spin and rattle
+        ("noslip", {"b": 10.0}, False),
+        ("noslip", {"n0": 0.0}, False),
+        ("noslip", {"x0": 0.0, "y0": 0.0}, False),  # no rattle grows
+        ("noslip", {"sigma": 1e-4}, False),  # the formula does not cover it
+        ("noslip", {"offset": 0.3}, True),
+        ("slip", {"mu": 100.0}, True),
+        ("slip", {"mu": 100.0, "n0": 0.002}, False),  # friction stops the reversal
+        ("slip", {"mu": 0.0}, False),
     ],
 )
-def test_where_there_is_no_time_there_is_a_reason(model: str, given: dict[str, float], reason: str) -> None:
+def test_a_time_is_predicted_where_the_formula_gives_one(model: str, given: dict[str, float], predicted: bool) -> None:
     found = sweep.predict({"model": model, "measure": FIRST}, **given)
-    assert REASONS[int(found.reversal_time_reason)] == reason
-    assert bool(np.isfinite(found.t_first_reversal_predicted)) == (reason == "predicted")
+    assert np.isnan(found.t_first_reversal_predicted) != predicted
 
 
-def test_only_who_measures_the_first_reversal_gets_its_prediction() -> None:
-    assert "t_first_reversal_predicted" not in sweep.predict({"model": "noslip", "measure": ["reversals"]})
+def test_the_prediction_comes_with_the_measured_times() -> None:
+    for measure, predicted in ((["reversals", "reversal_times"], True), (["reversals"], False)):
+        found = sweep.predict({"model": "noslip", "measure": measure})
+        assert ("t_first_reversal_predicted" in found) == predicted
 
 
 def test_much_friction_is_as_no_slip() -> None:
@@ -143,4 +144,3 @@ def test_a_body_that_cannot_stand_has_no_time_and_gives_no_warning() -> None:
     cases = {"c": [1.1, 1.3], "b": [1.2, 1.2]}
     found = sweep.predict({"friction": {"mu": 20}, "start": {"n0": 0.02}, "cases": cases, "measure": FIRST})
     assert np.isnan(found.t_first_reversal_predicted[1])
-    assert found.reversal_time_reason[1] == NOT_KNOWN

@@ -300,8 +300,9 @@ def test_axes_in_any_order_of_values() -> None:
 )
 def test_wrong_choices_are_refused(wrong: dict[str, Any], said: str) -> None:
     whole = 1.0 * made().reversals
+    times = whole.expand_dims(reversal=[1], axis=-1)
     with pytest.raises(InputError, match=f"^{said}"):
-        picture.plot(made().assign(t_first_reversal=whole, t_first_reversal_predicted=2 * whole), **wrong)
+        picture.plot(made().assign(reversal_times=times, t_first_reversal_predicted=2 * whole), **wrong)
 
 
 def test_limits_and_sizes_may_be_arrays() -> None:

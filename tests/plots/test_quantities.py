@@ -44,12 +44,14 @@ def whole() -> xr.Dataset:
         "cycle_variation": np.where(np.arange(SIZE[1]) < 4, 1e-4, 0.2) * np.ones(SIZE),
         "lyapunov": np.zeros(SIZE),
         "lyapunov_error": np.ones(SIZE),
-        "t_first_reversal": 100 * late,
         "t_first_reversal_predicted": np.full(SIZE, 100.0),
         "energy_error": np.full(SIZE, 1e-9),
     }
     axes = {"n0": np.geomspace(0.01, 0.1, SIZE[0]), "delta": np.geomspace(0.02, 0.4, SIZE[1])}
-    return xr.Dataset({name: (tuple(axes), v) for name, v in values.items()}, axes)
+    found = xr.Dataset({name: (tuple(axes), v) for name, v in values.items()}, axes)
+    times = np.stack([100 * late, 300 * late], axis=-1)
+    words = {"long_name": "time of each spin reversal"}
+    return found.assign(reversal_times=((*axes, "reversal"), times, words)).assign_coords(reversal=[1, 2])
 
 
 def titles(figure: Any) -> list[str]:
@@ -71,7 +73,7 @@ SHOWN = {
 
 
 @pytest.mark.parametrize("pictured", SHOWN)
-@pytest.mark.parametrize("measured", ["reversals first_reversal", "lyapunov cycles reversals first_reversal"])
+@pytest.mark.parametrize("measured", ["reversals reversal_times=2", "lyapunov cycles reversals reversal_times=2"])
 def test_a_picture_depends_on_what_is_named_and_not_on_what_is_measured_first(
     pictured: str, measured: str, whole: xr.Dataset
 ) -> None:
@@ -83,7 +85,7 @@ def test_a_picture_depends_on_what_is_named_and_not_on_what_is_measured_first(
 
 @pytest.mark.parametrize(
     ("lacking", "variable"),
-    [(["reversals"], "t_first_reversal"), (["reversals", "reversals_predicted", "t_first_reversal"], "lyapunov")],
+    [(["reversals"], "t_first_reversal"), (["reversals", "reversals_predicted", "reversal_times"], "lyapunov")],
 )
 def test_without_reversals_it_is_the_first_of_what_is_there(
     lacking: list[str], variable: str, whole: xr.Dataset
@@ -108,12 +110,18 @@ def test_the_picture_of_a_configuration_shows_what_it_is_about(name: str, variab
 def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
     source = Source(whole)
     assert set(DERIVED) == set(derivable(whole)) < set(source.variables)
-    assert source.variables[:5] == ["reversals", "reversals_predicted", "difference", "ratio", "regime"]
+    assert source.variables[:5] == ["reversals", "reversals_predicted", "difference", "t_first_reversal", "ratio"]
     for name in source.variables:
         picture.plot(whole, name)
-        part = source.map(name, "delta", "n0", {})
-        np.testing.assert_array_equal(part.values, field(whole, name).values)
+        part = source.map(name, "delta", "n0", {"reversal": 1})
+        expected = field(whole, name).isel(reversal=1, missing_dims="ignore")
+        np.testing.assert_array_equal(part.values, expected.values)
     assert not set(DERIVED) & set(Source(whole[["status", "reversals", "energy_error"]]).variables)
+
+
+def test_a_later_reversal_is_not_taken_for_the_first(whole: xr.Dataset) -> None:
+    assert field(whole.isel(reversal=[1]), "t_first_reversal").isnull().all()
+    assert "ratio" not in derivable(whole.isel(reversal=1))
 
 
 def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None:

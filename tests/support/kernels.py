@@ -97,7 +97,7 @@ SHARED = [
     ("dopri5", "slip+viscous+offset", default_measures("slip+viscous+offset")),
     ("dopri5", "slip", ()),
     ("dopri5", "slip", ("reversals",)),
-    ("dopri5", "slip", ("reversals", "first_reversal")),
+    ("dopri5", "slip", ("reversals", "reversal_times=3")),
     ("dopri5", "averaged", ("reversals",)),
 ]
 """Method, model and measurements of the kernels that several files of tests run."""

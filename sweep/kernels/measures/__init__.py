@@ -7,21 +7,18 @@ from collections.abc import Iterable
 from sweep.kernels.measures.cycles import Cycles
 from sweep.kernels.measures.decay import Decay
 from sweep.kernels.measures.energy import EnergyError
-from sweep.kernels.measures.first_reversal import FirstReversal
 from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.lyapunov import Lyapunov
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.measures.noise import NoiseLimited
-from sweep.kernels.measures.raw_reversals import RawReversals
 from sweep.kernels.measures.resting_spin import RestingSpin
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
 from sweep.models.model import Model, Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Reversals, EnergyError, Margin, FirstReversal, NoiseLimited, RestingSpin, ReversalTimes, RawReversals, Cycles,
-    Lyapunov, Foreseen,
+    Reversals, EnergyError, Margin, NoiseLimited, RestingSpin, ReversalTimes, Cycles, Lyapunov, Foreseen,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}

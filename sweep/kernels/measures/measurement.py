@@ -1,7 +1,7 @@
 """Define what a measurement is, and explain how to add one.
 
 Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of `sweep.kernels.measures`.  The
-configuration, the kernels of all methods, the dataset and the plots then include it.  `first_reversal` is the shortest
+configuration, the kernels of all methods, the dataset and the plots then include it.  `energy_error` is a short
 example.
 
 A measurement keeps its numbers in quantities of its own in each image, named by `quantities`.  It fills and reads

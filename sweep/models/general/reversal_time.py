@@ -47,11 +47,6 @@ from sweep.models.model import Array, Columns, zeros
 from sweep.models.theory.ripple import matrix
 from sweep.models.theory.rocking import frequencies
 
-PREDICTED, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL, NOT_KNOWN = range(6)
-REASONS = dict(enumerate(("predicted", "no_coupling", "no_spin", "no_rattle", "no_reversal", "not_known")))
-"""Whether there is a time, and why not: nothing couples spin and rattle; there is no spin to reverse; the mode that
-would grow has no energy; friction stops the reversal; or the formula does not cover the body or its friction."""
-
 
 def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
@@ -84,8 +79,11 @@ def energies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Arr
     return found[..., 1], found[..., 0]
 
 
-def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
-    """The time of the first reversal, in the model's units, and the reason (`REASONS`), each of shape (cells,).
+def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface = ELLIPSOID) -> Array:
+    """Predict the time of the first reversal, in the model's units, shape (cells,).
+
+    It is NaN where nothing couples spin and rattle, there is no spin to reverse, the mode that would grow has no
+    energy, friction stops the reversal, or the formula does not cover the body or its friction.
 
     Parameters
     ----------
@@ -102,11 +100,8 @@ def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface 
     N = np.sqrt(beyond**2 + e)
     with np.errstate(divide="ignore", invalid="ignore"):
         time = (np.arcsinh(beyond / np.sqrt(e)) + np.arctanh(critical / N)) / (sigma * N)
-    reason = np.select(
-        [_unknown(columns) | np.isnan(critical), sigma == 0, n0 == 0, e == 0, critical >= N],
-        [NOT_KNOWN, NO_COUPLING, NO_SPIN, NO_RATTLE, NO_REVERSAL], PREDICTED,
-    )  # fmt: skip
-    return np.where(reason == PREDICTED, time, np.nan), reason
+    predicted = ~_unknown(columns) & (sigma > 0) & (n0 != 0) & (e > 0) & (critical < N)
+    return np.where(predicted, time, np.nan)
 
 
 def _unknown(columns: Columns) -> Array:
