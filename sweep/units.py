@@ -46,7 +46,7 @@ def _product(powers: dict[str, int]) -> str:
 
 NUMBER, LENGTH, TIME, MASS, ANGLE = Unit(), Unit(length=1), Unit(time=1), Unit(mass=1), Unit(angle=1)
 SPEED, SLOWNESS = Unit(length=1, time=-1), Unit(length=-1, time=1)
-RATE, SPIN = Unit(time=-1), Unit(time=-1, angle=1)
+SPIN = Unit(time=-1, angle=1)
 ACCELERATION, ENERGY_PER_MASS = Unit(length=1, time=-2), Unit(length=2, time=-2)
 MASS_DENSITY, INERTIA, DRAG = Unit(mass=1, length=-3), Unit(mass=1, length=2), Unit(mass=1, length=2, time=-1)
 

@@ -67,7 +67,7 @@ VERBS = {
     "plot runs/small/small.nc --var energy_error": ["runs/small/small_energy_error.png"],
     "info runs/small/small.nc": [],
     "body --mass 30g --length 12cm --width 3cm --height 15mm": [],
-    "examples celtic_stone": ["celtic_stone.yaml", "celtic_stone.py"],
+    "examples tippe_top": ["tippe_top.yaml", "tippe_top.py"],
     "reproduce --help": [],
     "bench --help": [],
 }  # fmt: skip

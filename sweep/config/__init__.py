@@ -24,8 +24,6 @@ from sweep.config.values import Values, in_si
 from sweep.faults import Fault, InputError, fault_of
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
-from sweep.kernels.measures import MEASURES
-from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.model import ENDING, Model, Tier
@@ -238,11 +236,9 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
     `in_si` holds the values of all parameters if they are in SI; the default time is then in seconds.
     """
     integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
-    asked = [spec.partition("=")[0] for spec in values.measure or ()]
-    alone = any(TANGENT in MEASURES[name].follows for name in asked)
-    if "method" not in said or (alone and integrator.method == methods.AUTO):
+    if "method" not in said:
         choice = isinstance(model, Model) and len(methods.automatic(model)) > 1 and integrator.step == "auto"
-        found["method"] = methods.AUTO if choice and not alone else methods.PLAIN
+        found["method"] = methods.AUTO if choice else methods.PLAIN
     if "t_end" not in said:
         found["t_end"] = usual = _longest(schema.T_END, in_si)
         if ENDING in model.offers and ("stop_early" not in said or integrator.first_leg):

@@ -18,8 +18,6 @@ from sweep.config.values import Values
 from sweep.faults import Path, either
 from sweep.grid import BODY, Array, distinct
 from sweep.kernels import measures, methods
-from sweep.kernels.differentiate import undifferentiable
-from sweep.kernels.measures.measurement import TANGENT
 from sweep.models.general import starts, validity
 from sweep.models.general.surfaces import SURFACES
 from sweep.models.model import Model
@@ -122,17 +120,11 @@ def _of_integrator(config: Config) -> Iterator[Misfit]:
 
 def _unmeasurable(name: str, config: Config) -> Iterator[str]:
     """Say why the measurement `name` is impossible."""
-    model, kind, method = config.tier, measures.MEASURES[name], methods.METHODS.get(config.integrator.method)
-    possible = measures.possible(model)
+    model, possible = config.tier, measures.possible(config.tier)
     if name not in possible:
         yield f"{name} cannot be measured on the {model.name} model; choose from {', '.join(possible)}"
-    for needed in set(kind.needs) - {spec.partition("=")[0] for spec in config.measure}:
+    for needed in set(measures.MEASURES[name].needs) - {spec.partition("=")[0] for spec in config.measure}:
         yield f"{name} is measured with the {needed}; add {needed}"
-    if TANGENT in kind.follows and method and not method.takes_every_step:
-        able = either(each for each, found in methods.METHODS.items() if found.takes_every_step)
-        yield f"{name} cannot be measured with method: {method.name}; choose {able}"
-    elif TANGENT in kind.follows and isinstance(model, Model) and (reason := undifferentiable(model)):
-        yield f"{name} cannot be measured on the {model.name} model: {reason}; leave it out"
 
 
 def unlike(config: Config, film: Film) -> str:

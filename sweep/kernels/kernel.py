@@ -93,7 +93,7 @@ class Kernel:
     Attributes
     ----------
     measure : the specs of the measurements
-    follows : which of `WORK`, `RIPPLE` and `TANGENT` the measurements need in each step
+    follows : which of `WORK` and `RIPPLE` the measurements need in each step
     constants : names of the quantities that hold the constants of the model
     advancing : the compiled function behind `advance`
     """

@@ -83,4 +83,4 @@ class Method:
     has ended before does not depend on the limit."""
     takes_every_step: bool = False
     """Whether it takes equal, independent steps from t = 0 to the end: a run may then stop after any step and continue
-    towards another goal, and a tangent can be carried along (`sweep.kernels.tangent`)."""
+    towards another goal."""

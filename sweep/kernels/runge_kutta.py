@@ -12,12 +12,9 @@ from functools import partial
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
-from sweep.kernels import tangent
 from sweep.kernels.codegen import make_accept, make_access
-from sweep.kernels.differentiate import make_extended
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, PACK
-from sweep.kernels.measures.measurement import TANGENT
 from sweep.kernels.method import TOLERANCE, Method, Tolerance
 from sweep.kernels.status import RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
@@ -31,40 +28,15 @@ class RungeKutta(Stepper):
     def __init__(self, model: Model, tableau: Tableau) -> None:
         self.method, self.model, self.tableau = tableau.name, model, tableau
 
-    def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
-        """The quantities of the tangent, if a measurement follows it."""
-        return tangent.quantities(self.model) if TANGENT in follows else ()
-
     def images(
         self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
     ) -> Array:
         """As `Kernel.images`; the steps are no longer than `step` and divide `t_end` evenly."""
         goal = steps_to(t_end, step)
         stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
-        images = kernel.start(columns, t_end / goal, goal, stable_step, stable)
-        if TANGENT in kernel.follows:
-            table = kernel.table(images)
-            for name, values in tangent.start(self.model, kernel.states(images)).items():
-                table[name] = values
-        return images
+        return kernel.start(columns, t_end / goal, goal, stable_step, stable)
 
     def make_run_block(self, kernel: Kernel):
-        """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and then the same steps of the tangents, if
-        any."""
-        run_block = self._make_steps(kernel)
-        if TANGENT not in kernel.follows:
-            return run_block
-        step = make_step(self.tableau, make_extended(self.model), 2 * len(self.model.states))
-        follow = tangent.make_follow(step, self.model, kernel.layout)
-
-        @exactly_compiled
-        def run_both(group, packs):
-            run_block(group, packs)
-            follow(group)
-
-        return run_both
-
-    def _make_steps(self, kernel: Kernel):
         """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
         model, layout = self.model, kernel.layout
         load_states, load_constants, _ = make_access(model, layout)

@@ -113,12 +113,6 @@ def folded(ufunc: Any, *inputs: Any) -> Any:
     return None
 
 
-def choose(condition: str, a: Any, b: Any, yes: Any, no: Any) -> Any:
-    """`yes` if `condition` of a and b, such as "<", else `no`: on scalars, without a branch."""
-    trace = next(each.trace for each in (a, b, yes, no) if isinstance(each, Symbol))
-    return trace.node(f"({{2}} if {{0}} {condition} {{1}} else {{3}})", a, b, yes, no)
-
-
 def call(function: Any, name: str, values: int, *inputs: Any) -> Any:
     """`function` of symbols and the constants p, as one expression that is not traced further.
 

@@ -15,7 +15,7 @@ from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.reversals import Reversals
-from sweep.plots import labels, regimes
+from sweep.plots import labels
 from sweep.results.dataset import VARIABLES
 from sweep.results.probabilities import PROBABILITIES
 
@@ -50,10 +50,9 @@ DERIVED = {
     "difference": Derived(("reversals", "reversals_predicted"), _difference),
     "t_first_reversal": Derived(("reversal_times", "reversal"), _first),
     "ratio": Derived(("reversal_times", "reversal", "t_first_reversal_predicted"), _ratio),
-    "regime": Derived(regimes.NEEDS, regimes.regimes),
 }
 """`difference`: simulated minus predicted reversals; `t_first_reversal`: the first of `reversal_times`; `ratio`: that
-time divided by the predicted one; `regime`: see `sweep.plots.regimes`."""
+time divided by the predicted one."""
 
 COMPARISONS = {
     "difference": ("reversals", "reversals_predicted"),
@@ -62,7 +61,7 @@ COMPARISONS = {
 """The simulated variable and the prediction that each compares, which their figures show as well."""
 
 _SUBJECTS = (
-    "probability", "reversals", "reversals_predicted", "t_first_reversal", "lyapunov", "spin_final",
+    "probability", "reversals", "reversals_predicted", "t_first_reversal", "spin_final",
 )  # fmt: skip
 """Possible subjects of a dataset, in order of preference."""
 

@@ -38,10 +38,9 @@ def test_every_measurement_is_counted(name: str, monkeypatch: pytest.MonkeyPatch
     ("settings", "runs"),
     [
         ({"estimate_errors": True}, 1 + 1 / 1.5),
-        ({"measure": ["reversals", "lyapunov"]}, 3),
         ({"body": {"b": [2.0, 3.0], "offset": 0.1}}, 1.4),
     ],
-    ids=["errors", "lyapunov", "general"],
+    ids=["errors", "general"],
 )
 def test_what_runs_again_or_longer_is_counted(settings: dict[str, Any], runs: float) -> None:
     assert told("compute", **settings) == pytest.approx(runs * told("compute", measure=["reversals"]), rel=0.1)

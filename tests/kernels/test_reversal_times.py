@@ -1,4 +1,4 @@
-"""The times of the first K reversals, from the kernel to the file, and the regularity of cycles by these times."""
+"""The times of the first K reversals, from the kernel to the file."""
 
 from pathlib import Path
 
@@ -64,25 +64,3 @@ def test_the_setting_survives_in_the_configuration_of_the_dataset(found: xr.Data
     assert (
         sweep.load_config(write(TEXT), {"measure": ["reversals", "reversal_times"]}).measure[1] == "reversal_times=10"
     )
-
-
-@pytest.mark.campaign
-def test_cycles_are_those_of_the_reversal_times() -> None:
-    scene = {
-        "model": "noslip",
-        "body": {"a": 3.0, "b": 2.0, "delta": 0.3},
-        "start": {"n0": [0.05, 0.2, 0.4], "x0": 0.01, "y0": 0.01},
-        "measure": ["reversals", {"reversal_times": 60}, "cycles"],
-    }
-    found = sweep.run(scene, t_end=2000)
-    times = found.reversal_times.values
-    assert (found.reversals <= 60).all()
-    for row, mean, variation in zip(times, found.cycle_mean.values, found.cycle_variation.values, strict=True):
-        known = row[np.isfinite(row)]
-        lengths = known[2:] - known[:-2]
-        expected = lengths.mean() if len(lengths) else np.nan
-        spread = lengths.std(ddof=1) / expected if len(lengths) > 1 else np.nan
-        np.testing.assert_allclose(mean, expected, rtol=1e-12)
-        np.testing.assert_allclose(variation, spread, rtol=1e-6, atol=1e-9)
-    assert np.isnan(found.cycle_mean).any()
-    assert (found.cycle_variation > 0.01).any()

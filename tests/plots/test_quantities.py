@@ -16,11 +16,9 @@ import sweep
 from sweep.config import load_config
 from sweep.explorer import state
 from sweep.explorer.slices import Source
-from sweep.kernels.status import LIFT_OFF, SETTLED, TIME_LIMIT
+from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 from sweep.plots import picture
-from sweep.plots.marks import legend
 from sweep.plots.quantities import DERIVED, derivable, field, subject
-from sweep.plots.regimes import REGIMES
 from sweep.results.provenance import provenance
 
 SIZE = (6, 7)
@@ -28,7 +26,7 @@ SIZE = (6, 7)
 
 @pytest.fixture
 def whole() -> xr.Dataset:
-    """A dataset with all that a quantity is derived from: half of it reverses regularly, one cell has lifted off.
+    """A dataset with all that a quantity is derived from: one cell has lifted off.
 
     The first reversal comes 1.25 times as late as predicted, in the last row 5 times, and in one cell never.
     """
@@ -41,9 +39,8 @@ def whole() -> xr.Dataset:
         "status": status,
         "reversals": np.full(SIZE, 30, "int16"),
         "reversals_predicted": np.full(SIZE, 28, "int16"),
-        "cycle_variation": np.where(np.arange(SIZE[1]) < 4, 1e-4, 0.2) * np.ones(SIZE),
-        "lyapunov": np.zeros(SIZE),
-        "lyapunov_error": np.ones(SIZE),
+        "spin_final": np.zeros(SIZE),
+        "spin_error": np.ones(SIZE),
         "t_first_reversal_predicted": np.full(SIZE, 100.0),
         "energy_error": np.full(SIZE, 1e-9),
     }
@@ -66,14 +63,13 @@ SHOWN = {
     "difference reversals": ("difference", "difference", COUNTS),
     "t_first_reversal": ("t_first_reversal", "t_first_reversal", ["time of the first reversal"]),
     "ratio": ("ratio", "ratio", TIMES),
-    "regime": ("regime", "regime", ["regime of motion"]),
     "nothing_that_it_has": ("reversals", "difference", COUNTS),
 }
 """What the configuration names for pictures: what is explored first, the variable that is drawn, and its titles."""
 
 
 @pytest.mark.parametrize("pictured", SHOWN)
-@pytest.mark.parametrize("measured", ["reversals reversal_times=2", "lyapunov cycles reversals reversal_times=2"])
+@pytest.mark.parametrize("measured", ["reversals reversal_times=2", "reversal_times=2 reversals"])
 def test_a_picture_depends_on_what_is_named_and_not_on_what_is_measured_first(
     pictured: str, measured: str, whole: xr.Dataset
 ) -> None:
@@ -85,7 +81,7 @@ def test_a_picture_depends_on_what_is_named_and_not_on_what_is_measured_first(
 
 @pytest.mark.parametrize(
     ("lacking", "variable"),
-    [(["reversals"], "t_first_reversal"), (["reversals", "reversals_predicted", "reversal_times"], "lyapunov")],
+    [(["reversals"], "t_first_reversal"), (["reversals", "reversals_predicted", "reversal_times"], "spin_final")],
 )
 def test_without_reversals_it_is_the_first_of_what_is_there(
     lacking: list[str], variable: str, whole: xr.Dataset
@@ -96,7 +92,6 @@ def test_without_reversals_it_is_the_first_of_what_is_there(
 @pytest.mark.parametrize(
     ("name", "variable"),
     [
-        ("regimes", "regime"),
         ("reversal_time", "ratio"),
         ("mu_b", "reversals"),
         ("kane_levinson", "ratio"),
@@ -126,17 +121,15 @@ def test_a_later_reversal_is_not_taken_for_the_first(whole: xr.Dataset) -> None:
 
 def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None:
     source = Source(whole)
-    for (i, j), regime in (((1, 1), "reverses regularly"), ((1, 5), "undecided")):
-        told = source.values_at({"n0": i, "delta": j})
-        assert told["regime of motion"] == regime
-        assert told["first reversal, simulated / predicted"] == "1.25"
-        assert told["simulated − predicted"] == "+2"
-    assert source.map("regime", "delta", "n0", {}).legend["failed"] == "failed: 1 lifted off the table (1)"
+    told = source.values_at({"n0": 1, "delta": 1})
+    assert told["first reversal, simulated / predicted"] == "1.25"
+    assert told["simulated − predicted"] == "+2"
+    assert source.map("ratio", "delta", "n0", {}).legend["failed"] == "failed: 1 lifted off the table (1)"
 
 
 @pytest.mark.browser
 @pytest.mark.parametrize(
-    "name", ["reversals", "difference", "ratio", "t_first_reversal_predicted", "energy_error", "lyapunov"]
+    "name", ["reversals", "difference", "ratio", "t_first_reversal_predicted", "energy_error", "spin_final"]
 )
 def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Dataset) -> None:
     from sweep.explorer.figure import MapFigure  # needs Bokeh
@@ -160,7 +153,7 @@ def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Datase
 
 @pytest.mark.parametrize(("variable", "limits", "arrows"), [("ratio", None, "max"), ("energy_error", None, "neither"),
                                                             ("t_first_reversal", (100, 200), "max"),
-                                                            ("lyapunov_error", (2, 3), "min")])  # fmt: skip
+                                                            ("spin_error", (2, 3), "min")])  # fmt: skip
 def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, arrows: str, whole: xr.Dataset) -> None:
     bars = [axes for axes in picture.plot(whole, variable, limits=limits).axes if hasattr(axes, "_colorbar")]
     assert bars[-1]._colorbar.extend == arrows
@@ -178,39 +171,6 @@ def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None
     (missing,) = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
     assert (missing.get_label(), len(missing.get_xdata())) == ("no reversal (1)", 1)
     assert entries(picture.plot(whole.isel(delta=1), "ratio")) == ["time of the first reversal"]
-
-
-CELLS = {
-    "settles": (SETTLED, 7, 0.5, 0.1),
-    "few_reversals": (TIME_LIMIT, 3, np.nan, 0.1),
-    "reverses_regularly": (TIME_LIMIT, 30, 0.009, 0.001),
-    "wanders": (TIME_LIMIT, 30, 0.011, 0.0031),
-    "undecided": (TIME_LIMIT, 30, 0.011, 0.0029),
-}
-"""Status, reversals, variation of the cycles, and exponent."""
-
-
-def moving(cells: list[tuple[Any, ...]]) -> xr.Dataset:
-    names = ("status", "reversals", "cycle_variation", "lyapunov")
-    columns = {name: ("n0", np.array(values)) for name, values in zip(names, zip(*cells, strict=True), strict=True)}
-    dataset = xr.Dataset(columns, {"n0": np.arange(len(cells)) / 10})
-    return dataset.assign(lyapunov_error=("n0", np.full(len(cells), 1e-3)), status=dataset["status"].astype("int8"))
-
-
-@pytest.mark.parametrize("regime", CELLS)
-def test_a_regime_is_told_by_its_thresholds(regime: str) -> None:
-    assert REGIMES[field(moving([CELLS[regime]]), "regime").item()] == regime
-
-
-def test_a_body_that_lifts_off_has_none() -> None:
-    found = moving([*CELLS.values(), (LIFT_OFF, 0, np.nan, np.nan)])
-    assert "failed: 1 lifted off" in legend(found, "regime")["failed"]
-    assert any("lifted off" in each for each in entries(sweep.plot(found, "regime")))
-
-
-def test_without_an_exponent_there_is_no_regime() -> None:
-    with pytest.raises(ValueError, match="no variable regime"):
-        field(moving([CELLS["reverses_regularly"]]).drop_vars("lyapunov"), "regime")
 
 
 FORMULA = """\
@@ -259,10 +219,12 @@ def test_pictures_are_no_part_of_what_a_run_is() -> None:
 
 
 def test_pictures_of_a_file_are_set_aside_where_something_else_is_measured() -> None:
-    asked = load_config({"friction": {"mu": [20, 60]}, "measure": ["cycles", "reversals"], "picture": ["cycle_mean"]})
+    asked = load_config(
+        {"friction": {"mu": [20, 60]}, "measure": ["energy_error", "reversals"], "picture": ["energy_error"]}
+    )
     assert load_config(asked, {"measure": ["reversals"]}).picture == ()
     assert load_config(asked, {"measure": ["reversals"], "picture": ["status"]}).picture == ("status",)
-    assert load_config(asked, {"mu": [20, 70]}).picture == ("cycle_mean",)
+    assert load_config(asked, {"mu": [20, 70]}).picture == ("energy_error",)
 
 
 def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_pictures(tmp_path: Path, write: Write) -> None:

@@ -17,8 +17,7 @@ from sweep.results import provenance
 from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.writing import replacing
 
-NOT_BY_DEFAULT = """method t_first_reversal_predicted cycle_mean cycle_variation lyapunov
-lyapunov_error reversal_times reversals_foreseen foreseen_sure"""
+NOT_BY_DEFAULT = """method t_first_reversal_predicted reversal_times reversals_foreseen foreseen_sure"""
 
 
 def test_dataset_is_labelled(small: xr.Dataset) -> None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from sweep.kernels.measures.cycles import Cycles
 from sweep.kernels.measures.decay import Decay
 from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.foreseen import Foreseen
-from sweep.kernels.measures.lyapunov import Lyapunov
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.measures.noise import NoiseLimited
@@ -18,7 +16,7 @@ from sweep.kernels.measures.reversals import Reversals
 from sweep.models.model import Model, Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Reversals, EnergyError, Margin, NoiseLimited, RestingSpin, ReversalTimes, Cycles, Lyapunov, Foreseen,
+    Reversals, EnergyError, Margin, NoiseLimited, RestingSpin, ReversalTimes, Foreseen,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}

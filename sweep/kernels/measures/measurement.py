@@ -52,9 +52,8 @@ def measured(
     return Variable(dtype, units, long_name, description, flags, along=along, of_sound_runs=True)
 
 
-WORK, RIPPLE, TANGENT = "work", "ripple", "tangent"
-"""Quantities that a measurement may follow: the work of friction, the ripple-free spin, or the growth of a tangent
-(`sweep.kernels.tangent`)."""
+WORK, RIPPLE = "work", "ripple"
+"""Quantities that a measurement may follow: the work of friction, and the ripple-free spin."""
 
 
 class Step(NamedTuple):
@@ -123,8 +122,7 @@ class Measurement:
     by_default: ClassVar[bool] = False
     """Whether it is made by default, if the model supports it."""
     follows: ClassVar[frozenset[str]] = frozenset()
-    """Which quantities it needs in each step; they are computed only on request: `WORK`, `RIPPLE` or `TANGENT`.  A
-    tangent needs a method that `Method.takes_every_step`."""
+    """Which quantities it needs in each step; they are computed only on request: `WORK` or `RIPPLE`."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
