@@ -408,7 +408,7 @@ def fit(
     time_column, spin_column : names of the columns of the film, with a unit if it gives none, such as "omega (deg/s)";
         by default columns with known names
     free : names of the parameters to find, including film_delay and film_bias of the film itself
-    laws : laws of friction to compare, such as ``["viscous", "coulomb-tanh"]``.  Each law takes its parameters from
+    laws : laws of friction to compare, such as ``["viscous", "coulomb"]``.  Each law takes its parameters from
         `config`; those that `config` does not give are also free. Parameters that a law does not have are ignored
 
     Returns

@@ -209,7 +209,7 @@ def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physi
     made = loading.load(origin) if origin else None
     if isinstance(made, Model):  # a user's model gives the units itself
         return Physics(made.units, LAWS[PAPER_LAW], ELLIPSOID, names)
-    law = made.law if made else LAWS[values.friction.name]
+    law = made.law if made else LAWS[values.friction.law]
     return Physics(values.units, law, SURFACES[values.body.surface], names)
 
 

@@ -191,8 +191,7 @@ class Config:
         if self.units != PAPER_UNITS and self.of_rattlebacks:
             top["units"] = self.units
         if self.law != PAPER_LAW and not self.origin:
-            law, _, regularisation = self.law.partition("-")
-            found["friction"] |= {"law": law} | ({"regularisation": regularisation} if regularisation else {})
+            found["friction"] |= {"law": self.law}
         if self.surface != ELLIPSOID.name:
             found["body"] |= {"surface": self.surface}
         for name, value in self.parameters.items():

@@ -43,7 +43,7 @@ body:
 {entries}
 # These are guesses: of dry friction on wood, of a drag that stops the spin within a minute, and of a start in the sense
 # that turns back.  `run` shows what they lead to, and `fit` finds them from a film.
-friction: {{law: coulomb, mu: 0.3, regularisation: sqrt, speed: 5.0e-3, sigma: {sigma:.2g}}}
+friction: {{law: coulomb, mu: 0.3, speed: 5.0e-3, sigma: {sigma:.2g}}}
 start: {{n0: {n0:g}, x0: {x0:.2g}, y0: {y0:.2g}}}
 """
 

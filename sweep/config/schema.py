@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import BeforeValidator, Field, create_model
 from pydantic.fields import FieldInfo
 
 from sweep.config.messages import Allowed, wrong
@@ -156,29 +156,8 @@ def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
     }
 
 
-def _parts(which: int) -> tuple[str, ...]:
-    """Return the laws of friction (0) or their regularisations, where there are several (2), from `LAWS`."""
-    return tuple(dict.fromkeys(part for name in LAWS if (part := name.partition("-")[which])))
-
-
 class Friction(Strict):
-    law: Literal[_parts(0)] = Field(default=PAPER_LAW, description="law of slip friction")  # type: ignore[valid-type]
-    regularisation: Literal[_parts(2)] = Field(  # type: ignore[valid-type]
-        default=_parts(2)[0], description="how Coulomb friction passes through zero slip, within `speed`"
-    )
-
-    @property
-    def name(self) -> str:
-        """Return the name of the law in `sweep.models.general.laws.LAWS`."""
-        return self.law if self.law in LAWS else f"{self.law}-{self.regularisation}"
-
-    @model_validator(mode="after")
-    def _regularised(self) -> Friction:
-        if self.name not in LAWS:
-            raise wrong(f"the law {self.law} has no regularisation {self.regularisation}; choose another", "law")
-        if self.law in LAWS and "regularisation" in self.model_fields_set:
-            raise wrong(f"the law {self.law} needs no regularisation; leave it out", "regularisation")
-        return self
+    law: Literal[tuple(LAWS)] = Field(default=PAPER_LAW, description="law of slip friction")  # type: ignore[valid-type]
 
 
 class Body(Strict):

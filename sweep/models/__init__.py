@@ -8,7 +8,7 @@ MODELS: dict[str, Model] = {module.MODEL.name: module.MODEL for module in (slip,
 
 
 def find(name: str) -> Model:
-    """The model of a name: one of `MODELS`, or a variant such as `slip+coulomb-tanh+sigma`."""
+    """The model of a name: one of `MODELS`, or a variant such as `slip+coulomb+sigma`."""
     return MODELS[name] if name in MODELS else variants.variant(name)
 
 

@@ -1,7 +1,7 @@
 """Choose the variant of `slip` or `noslip` for a body and a law of friction.
 
 A *variant* is specialised for one law, and for the couples, extras (`sweep.models.general.common.EXTRAS`) and surface
-that its name lists: `slip+coulomb-tanh+sigma`, `noslip+solid+rolling`, `slip+viscous+offset+gravity`.  Whatever it does
+that its name lists: `slip+coulomb+sigma`, `noslip+solid+rolling`, `slip+viscous+offset+gravity`.  Whatever it does
 not name adds no instruction to its kernel.  The variant of the paper's body is `slip` itself.
 
 The `Physics` of a configuration chooses the variant that runs it.
@@ -63,7 +63,7 @@ def make(variant: Variant, parameters: tuple[str, ...] = ()) -> Model:
 
 
 def variant(name: str, own: Law | None = None) -> Model:
-    """The model of a name, such as `slip+coulomb-tanh+sigma`; `own` is a user's law that the name refers to.
+    """The model of a name, such as `slip+coulomb+sigma`; `own` is a user's law that the name refers to.
 
     Raises
     ------

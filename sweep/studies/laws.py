@@ -44,26 +44,22 @@ def fitted(
     """Fit as `sweep.api.fit`; `columns` names the time and data columns."""
     if laws and (config.origin or config.model != "slip"):
         raise fault_of("laws of friction can be compared only in the slip model; set model: slip")
+    for name in laws:
+        if name not in LAWS:
+            words = f"{brief(name)} is not a law of friction{suggestion(name, LAWS)}"
+            raise fault_of(f"{words}; choose from {', '.join(LAWS)}")
     film, note = film if isinstance(film, Film) else read(film, *columns), reporter.note
     config = with_optional(config, free)
     if not laws:
         return fit(config, film, free, note)
     found: dict[str, xr.Dataset] = {}
-    for name in dict.fromkeys(map(_full_name, laws)):
+    for name in dict.fromkeys(laws):
         other, own = _with_law(config, LAWS[name])
         theirs = [each for each in free if each in other.tier.parameters or each not in config.table]
         dropped, names = [each for each in free if each not in theirs], list(dict.fromkeys([*theirs, *own]))
         note(f"law {name}: free are {', '.join(names)}" + (f"; it has no {', '.join(dropped)}" if dropped else ""))
         found[name] = fit(other, film, names, note, compared=True)
     return _together(found, film)
-
-
-def _full_name(name: str) -> str:
-    """Return the name of a law, with the first regularisation if it has several and none is given."""
-    full = next((each for each in LAWS if each == name or each.startswith(f"{name}-")), None)
-    if full is None:
-        raise fault_of(f"{brief(name)} is not a law of friction{suggestion(name, LAWS)}; choose from {', '.join(LAWS)}")
-    return full
 
 
 def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
@@ -75,9 +71,7 @@ def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
     kept = {key: document[key] for key in document if key not in ("integrator", "measure")}
     owned = {name for each in LAWS.values() for name in each.parameters}
     given = document.get("friction", {})
-    friction = {name: value for name, value in given.items() if name not in {*owned, "law", "regularisation"}}
-    kind, _, regularisation = law.name.partition("-")
-    friction |= {"law": kind} | ({"regularisation": regularisation} if regularisation else {})
+    friction = {name: value for name, value in given.items() if name not in {*owned, "law"}} | {"law": law.name}
     said = [name for name in law.parameters if name in given and (name in law.pure) == (name in before.pure)]
     friction |= {name: given[name] for name in said}
     own = [name for name in law.parameters if name not in said and config.table[name].default is None]

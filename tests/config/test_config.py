@@ -114,7 +114,7 @@ def read(write: Write) -> Read:
 
 def test_a_real_body(read: Read) -> None:
     config = read(STONE)
-    assert config.equations.name == "slip+coulomb-tanh+sigma+offset+gravity"
+    assert config.equations.name == "slip+coulomb+sigma+offset+gravity"
     assert set(config.parameters) == set(config.tier.parameters)
     columns = config.grid.columns()
     assert columns["roll"] == pytest.approx(np.pi / 360)
@@ -126,7 +126,7 @@ def test_a_real_body(read: Read) -> None:
 
 def test_what_the_numbers_of_a_paraboloid_mean(read: Read) -> None:
     config = read(BOWL)
-    assert config.equations.name == "slip+coulomb-tanh+sigma+gravity+paraboloid"
+    assert config.equations.name == "slip+coulomb+sigma+gravity+paraboloid"
     assert config.described("a") == {
         "long_name": "coefficient a of the paraboloid",
         "description": "The paraboloid is z = c (1 - a (x/c)^2 - b (y/c)^2).",
@@ -166,7 +166,7 @@ BEYOND = {
     "friction: {mu: 10, sigma: 0.1}": "slip+viscous+sigma",
     "start: {omega1: 0.1}": "slip",
     "friction: {law: none}": "slip+none",
-    "friction: {law: coulomb, mu: 0.2, speed: 0.01}": "slip+coulomb-sqrt",
+    "friction: {law: coulomb, mu: 0.2, speed: 0.01}": "slip+coulomb",
     "model: noslip\nbody: {offset: 0.1}": "noslip+solid+offset",
     "friction: {mu: 6, sigma: 0.1, mu_spinning: 0.1, radius_spinning: 0.1, speed_spinning: 0.1}":
         "slip+viscous+sigma+spinning",

@@ -242,7 +242,7 @@ def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_o
     scene = {"units": "SI", "body": {"c": 0.02, "offset": 0.01, "mass": 1.0, **inertia, **shape}}
     scene |= {"start": {"roll": 0.1, "pitch": 0.2, "omega1": 1.0, "omega3": [-5.0, 0.3], "slip1": 0.1}}
     force = {"mu": 0.5, "speed": 0.01, "sigma": 1e-4}
-    ours = load_config({**scene, "friction": {"law": "coulomb", "regularisation": "sqrt", **force}})
+    ours = load_config({**scene, "friction": {"law": "coulomb", **force}})
     mine = load_config({**scene, "model": str(folder / "mine.py"), "friction": force})
     assert mine.surface == shape.get("surface", "ellipsoid")
     assert load_config(mine, {"mu": 0.6}).surface == load_config(dict(mine.document())).surface == mine.surface

@@ -34,7 +34,7 @@ NATURAL = {
 }  # fmt: skip
 ROLLING: dict[str, Any] = {"model": "noslip", "measure": ["reversals", {"reversal_times": 1}, "energy_error"]}
 ROLLING_NATURALLY = NATURAL | {"sigma": [0.0, 0.0113]}
-DRY: dict[str, Any] = {"friction": {"law": "coulomb", "regularisation": "tanh"}}
+DRY: dict[str, Any] = {"friction": {"law": "coulomb"}}
 SLIPPING_NATURALLY = NATURAL | {"mu": [0.2, 0.5], "speed": 0.045, "sigma": 0.0113, "slip1": 0.1, "slip2": -0.2}
 """Scenes, and their numbers in the paper's units."""
 

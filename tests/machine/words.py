@@ -35,7 +35,7 @@ TEXTS: dict[str | None, tuple[str, ...]] = {
     "LOW..HIGH": ("0..5", "-1..1", "0..1e7", "5..1", "1e-9..2e-9", "0..0.5"),
     "LENGTH": ("85mm", "50mm", "3in", "17 cm", "2mm", "1"),
     "NUMBER[+-ERROR]UNIT": ("12.0+-0.1cm", "30g", "1.24g/cm3", "2deg", "5mm", "1 in", "x"),
-    "NAME,NAME": ("mu", "n0,mu", "film_delay", "viscous,coulomb-tanh", "c", ""),
+    "NAME,NAME": ("mu", "n0,mu", "film_delay", "viscous,coulomb", "c", ""),
     "NAME": ("viridis", "magma", "RdBu", "quick"),
     None: (*AXES, "count", *VARIABLES, *DERIVED, "nothing"),
 }

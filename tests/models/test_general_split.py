@@ -107,7 +107,7 @@ def test_the_ripple_is_that_of_the_full_model() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["slip+coulomb-sqrt", "slip+none", "slip+viscous+rolling", "slip+viscous+sigma+rolling", "noslip+solid"]
+    "name", ["slip+coulomb", "slip+none", "slip+viscous+rolling", "slip+viscous+sigma+rolling", "noslip+solid"]
 )
 def test_models_that_have_no_split_form(name: str) -> None:
     assert not has_form(find(name))

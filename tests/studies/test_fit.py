@@ -35,7 +35,7 @@ SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0
 STONE = """\
 units: SI
 body: {a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0, Ixx: 2.0e-4, Iyy: 1.6e-3, Izz: 1.7e-3, Ixy: -2.0e-5}
-friction: {law: coulomb, regularisation: sqrt, mu: [0.1, 0.9], speed: [0.2, 1.5]}
+friction: {law: coulomb, mu: [0.1, 0.9], speed: [0.2, 1.5]}
 start: {n0: 5, x0: 2.0e-3, y0: 2.0e-4}
 integrator: {t_end: 2}
 """
@@ -240,7 +240,7 @@ def test_a_film_of_the_true_body_is_reproduced(write: Write, what: Seen) -> None
     cell = (config := sweep.load_config(write(STONE), {"mu": 0.3, "speed": 0.5, **ROCKED})).grid.columns()
     start, true = stack(config.equations.start(cell))[:, 0], {"film_delay": 0.05, "film_bias": 0.3}
     times = np.arange(0, 1, 1 / 60)
-    body, law = {name: float(value[0]) for name, value in cell.items()}, "coulomb-sqrt"
+    body, law = {name: float(value[0]) for name, value in cell.items()}, "coulomb"
     late = np.append(0, times + true["film_delay"])
     y = newton.follow(start, body, law, late)
     if what == "heading":
@@ -370,7 +370,7 @@ def test_what_was_measured_of_the_body_is_a_prior(write: Write, seen: tuple[np.n
 
 def test_a_drag_is_sought_where_the_configuration_names_none(write: Write) -> None:
     config = write(DRY)
-    found = sweep.fit(config, film_of(config, "coulomb-sqrt"), ["sigma", "n0"])
+    found = sweep.fit(config, film_of(config, "coulomb"), ["sigma", "n0"])
     one = found.sel(parameter="sigma")
     assert one.lower_95.item() == 0.0 < one.upper_95.item() < 1e-4
     assert one.edge.item() == 0
@@ -417,7 +417,7 @@ def test_an_animation_of_several_laws_is_that_of_the_best(of_laws: xr.Dataset) -
     late = of_laws.reindex(parameter=[*of_laws.parameter.values, "film_delay"])
     late["value"].loc[{"parameter": "film_delay"}] = 0.25
     film, fit = (shown(late).sel(trajectory=name) for name in ("film", "fit"))
-    best = of_laws.sel(law="coulomb-sqrt")
+    best = of_laws.sel(law="coulomb")
     assert fit.time[-1] == best.time[-1] + 0.25
     off = (best.seen - best.fitted).where(~best.outlier, drop=True)
     np.testing.assert_allclose((film.spin - fit.spin)[[0, -1]], off[[0, -1]], atol=1e-12)
@@ -467,7 +467,7 @@ def test_what_cannot_be_fitted_is_refused(write: Write, free: list[str], overrid
 
 
 DRY = "name: stone\n" + STONE.replace("mu: [0.1, 0.9], speed: [0.2, 1.5]", "mu: 0.3, speed: 0.02")
-VISCOUS = DRY.replace("law: coulomb, regularisation: sqrt, mu: 0.3, speed: 0.02", "mu: 2")
+VISCOUS = DRY.replace("law: coulomb, mu: 0.3, speed: 0.02", "mu: 2")
 SHAKY = 0.05
 """Noise of the films of `DRY` and `VISCOUS`."""
 
@@ -486,15 +486,15 @@ def film_of(config: Path, law: str, error: float | None = None) -> Film:
 def of_laws(kept: Write) -> xr.Dataset:
     """A film with dry friction, which both laws are fitted to."""
     path = kept(DRY)
-    return sweep.fit(path, film_of(path, "coulomb-sqrt"), ["mu", "n0", "mu_static"], laws=["viscous", "coulomb"])
+    return sweep.fit(path, film_of(path, "coulomb"), ["mu", "n0", "mu_static"], laws=["viscous", "coulomb"])
 
 
 def test_a_film_is_attributed_to_its_law(of_laws: xr.Dataset) -> None:
-    assert of_laws.law.values.tolist() == ["viscous", "coulomb-sqrt"]
+    assert of_laws.law.values.tolist() == ["viscous", "coulomb"]
     assert of_laws.number_free.values.tolist() == [2, 2]
-    assert of_laws.weight.sel(law="coulomb-sqrt").item() > 0.9999
-    assert "viscous is ruled out in favour of coulomb-sqrt: Akaike's criteria" in of_laws.attrs["undetermined"]
-    true = of_laws.sel(law="coulomb-sqrt", parameter="mu")
+    assert of_laws.weight.sel(law="coulomb").item() > 0.9999
+    assert "viscous is ruled out in favour of coulomb: Akaike's criteria" in of_laws.attrs["undetermined"]
+    true = of_laws.sel(law="coulomb", parameter="mu")
     assert true.lower_95.item() < 0.3 < true.upper_95.item()
     assert true.chi_square.item() == pytest.approx(len(of_laws.time) - 2)
     assert "law: coulomb" in of_laws.attrs["config"]
@@ -504,10 +504,10 @@ def test_a_film_is_attributed_to_its_law(of_laws: xr.Dataset) -> None:
 def test_laws_that_cannot_be_told_apart_are_said(write: Write) -> None:
     """A slip far below its speed: dry friction is viscous, with one parameter more."""
     config = write(VISCOUS)
-    found = sweep.fit(config, film_of(config, "viscous", SHAKY), ["mu", "n0"], laws=["viscous", "coulomb-sqrt"])
+    found = sweep.fit(config, film_of(config, "viscous", SHAKY), ["mu", "n0"], laws=["viscous", "coulomb"])
     words = found.attrs["undetermined"]
-    assert "viscous and coulomb-sqrt cannot be distinguished by this film" in words
-    assert "coulomb-sqrt: speed and mu are known only in combination" in words
+    assert "viscous and coulomb cannot be distinguished by this film" in words
+    assert "coulomb: speed and mu are known only in combination" in words
     assert "misses the film" not in words
     assert found.number_free.values.tolist() == [2, 3]
     assert np.isnan(found.value.sel(law="viscous", parameter="speed"))
@@ -542,8 +542,7 @@ def test_the_command_compares_laws_and_writes_table_picture_and_the_best_body(wr
 
 LAWS: dict[str, dict[str, Any]] = {
     "viscous": {"mu": 30.0},
-    "coulomb-sqrt": {"law": "coulomb", "regularisation": "sqrt", "mu": 0.3, "speed": 0.01},
-    "coulomb-tanh": {"law": "coulomb", "regularisation": "tanh", "mu": 0.3, "speed": 0.01},
+    "coulomb": {"law": "coulomb", "mu": 0.3, "speed": 0.01},
 }
 """Laws of friction, with guesses of their parameters."""
 

@@ -93,7 +93,7 @@ SHARED = [
     ("dopri5", "noslip", default_measures("noslip")),
     ("dopri5", "effective", default_measures("effective")),
     ("dopri5", "averaged", default_measures("averaged")),
-    ("dopri5", "slip+coulomb-sqrt+sigma", default_measures("slip+coulomb-sqrt+sigma")),
+    ("dopri5", "slip+coulomb+sigma", default_measures("slip+coulomb+sigma")),
     ("dopri5", "slip+viscous+offset", default_measures("slip+viscous+offset")),
     ("dopri5", "slip", ()),
     ("dopri5", "slip", ("reversals",)),

@@ -27,9 +27,7 @@ def _stribeck(x: float, p: Mapping[str, float]) -> float:
 LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
     "viscous": lambda x, p: p["mu"] * x,
     "none": lambda x, p: 0.0,  # noqa: ARG005
-    "coulomb-sqrt": lambda x, p: p["mu"] * x / np.sqrt(x**2 + p["speed"] ** 2),
-    "coulomb-tanh": lambda x, p: p["mu"] * np.tanh(x / p["speed"]),
-    "coulomb-cubic": lambda x, p: p["mu"] * x / rounded(x, p["speed"]),
+    "coulomb": lambda x, p: p["mu"] * x / np.sqrt(x**2 + p["speed"] ** 2),
     "stribeck": _stribeck,
 }
 """Friction force per unit of normal force, at the slip velocity x >= 0: the package's laws."""

@@ -23,7 +23,7 @@ model: slip
 units: SI
 gravity: 9.81
 body: {{a: 0.2, b: 0.03, c: 0.02, offset: 0.01, mass: 1.0{MOMENTS}}}
-friction: {{law: coulomb, mu: 0.5, regularisation: tanh, speed: 1.0e-3, sigma: 1.0e-4}}
+friction: {{law: coulomb, mu: 0.5, speed: 1.0e-3, sigma: 1.0e-4}}
 start: {{roll: 0.5 deg, pitch: 0.5 deg, {TURNS}}}
 integrator: {{t_end: 5}}
 """

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.general.laws import Law, rounded
+from sweep.models.general.laws import Law
 from sweep.models.general.rigid_body import mass
 from sweep.models.model import Array, Columns
 
@@ -35,6 +35,13 @@ class Couple:
     about_normal: bool = False
     """Whether it resists the spin alone; it is then per unit of the normal force."""
     linear: bool = True
+
+
+@inline
+def rounded(x, width):
+    """x from `width` on; below it a cubic, x²/s (1 - x/(3 s)) + s/3, that keeps away from zero."""
+    t = np.minimum(x / width, 1.0)
+    return np.maximum(x, width) + width * (t * t * (1.0 - t / 3.0) - 2.0 / 3.0)
 
 
 @inline

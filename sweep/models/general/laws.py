@@ -26,7 +26,7 @@ class Law:
     """A law of friction."""
 
     name: str
-    """The name used in names of models: the `law` of a configuration and, after a hyphen, its `regularisation`."""
+    """The `law` of a configuration, used in names of models too."""
     parameters: tuple[str, ...]
     """Names of its physical parameters, which are its constants too."""
     resistance: Callable[..., Any]
@@ -61,50 +61,14 @@ _TINY = 1e-20
 
 
 @inline
-def tanh_ratio(square):
-    """tanh(x)/x from x², to 1e-15; x is real or has a tiny imaginary part.
-
-    A call of the C library's tanh would keep the loop over lanes from being vectorised.  So tanh(x/32) is taken from
-    its continued fraction and doubled five times, tanh(2 y) = 2 N D / (N² + D²) for tanh(y) = N/D.
-    """
-    x = np.sqrt(square + _TINY)
-    y = np.minimum(x, 20.0) * 0.03125
-    q = y * y
-    N = y * (1.0 + q * (17325.0 + q * (378.0 + q)) / 135135.0)
-    D = 1.0 + q * (62370.0 + q * (3150.0 + 28.0 * q)) / 135135.0
-    N, D = 2.0 * N * D, N * N + D * D
-    N, D = 2.0 * N * D, N * N + D * D
-    N, D = 2.0 * N * D, N * N + D * D
-    N, D = 2.0 * N * D, N * N + D * D
-    N, D = 2.0 * N * D, N * N + D * D
-    return N / (D * x)
-
-
-@inline
-def rounded(x, width):
-    """x from `width` on; below it a cubic, x²/s (1 - x/(3 s)) + s/3, that keeps away from zero."""
-    t = np.minimum(x / width, 1.0)
-    return np.maximum(x, width) + width * (t * t * (1.0 - t / 3.0) - 2.0 / 3.0)
-
-
-@inline
 def _viscous(square, p):
     return p.mu
 
 
 @inline
-def _sqrt(square, p):
+def _coulomb(square, p):
+    """Of the size μ, within `speed` of zero slip proportional to it."""
     return p.mu / np.sqrt(square + p.speed * p.speed)
-
-
-@inline
-def _tanh(square, p):
-    return p.mu / p.speed * tanh_ratio(square / (p.speed * p.speed))
-
-
-@inline
-def _cubic(square, p):
-    return p.mu / rounded(np.sqrt(square), p.speed)
 
 
 @inline
@@ -160,16 +124,7 @@ def _contensou(square, spin_square, p):
 
 
 _LINEAR = 0.1
-"""Share of its own speed up to which a law counts as linear: the cubic is off by 0.03 there, the others by 0.01."""
-
-
-def _coulomb(regularisation: str, resistance: Callable[..., Any], steepest: float) -> Law:
-    """Coulomb's law with a width `speed`, where k v grows by `steepest` times μ/speed at most."""
-    return Law(
-        f"coulomb-{regularisation}", ("mu", "speed"), resistance,
-        lambda columns: steepest * columns["mu"] / columns["speed"],
-        linear_to=lambda columns: np.asarray(_LINEAR * columns["speed"]), pure=frozenset({"mu"}),
-    )  # fmt: skip
+"""Share of its own speed up to which a law counts as linear: it is off by 0.01 there."""
 
 
 LAWS: dict[str, Law] = {
@@ -177,9 +132,10 @@ LAWS: dict[str, Law] = {
     for law in (
         Law("viscous", ("mu",), _viscous, lambda columns: columns["mu"]),
         Law("none", (), nothing, lambda columns: np.zeros_like(columns["a"])),
-        _coulomb("sqrt", _sqrt, 1.0),
-        _coulomb("tanh", _tanh, 1.0),
-        _coulomb("cubic", _cubic, 3.0),
+        Law(
+            "coulomb", ("mu", "speed"), _coulomb, lambda columns: columns["mu"] / columns["speed"],
+            linear_to=lambda columns: np.asarray(_LINEAR * columns["speed"]), pure=frozenset({"mu"}),
+        ),
         Law(
             "stribeck", ("mu", "mu_static", "speed", "speed_stick", "mu_viscous"), _stribeck,
             lambda columns: columns["mu_static"] / columns["speed_stick"] + columns["mu_viscous"],
@@ -187,7 +143,7 @@ LAWS: dict[str, Law] = {
             pure=frozenset({"mu"}),
         ),
         Law(
-            "contensou", ("mu", "radius_contact", "speed"), _sqrt, lambda columns: columns["mu"] / columns["speed"],
+            "contensou", ("mu", "radius_contact", "speed"), _coulomb, lambda columns: columns["mu"] / columns["speed"],
             coupled=_contensou,
             # The couple falls with d most steeply where d² = 0.8.
             strongest_couple=lambda columns: 0.338 * columns["mu"] * columns["radius_contact"] ** 2 / columns["speed"],
