@@ -39,9 +39,8 @@ BROKEN: list[tuple[str, int, str, str]] = [
     ("mu: 60\n", 1, "mu", "unknown key (did you mean friction.mu?); the keys here are name"),
     *(
         (small("delta:", f"{key}: 0.1, delta:"), 2, f"body.{key}", "unknown key: the centre of mass lies on the axis through the surface's centre and lowest point, offset below that centre; no model")
-        for key in ("offset_x", "offsety", "x_offset", "com_y", "centre_of_mass_x")
+        for key in ("offset_x", "centre_of_mass_y")
     ),
-    (small("delta:", "ofset: 0.1, delta:"), 2, "body.ofset", "unknown key (did you mean offset?)"),
     (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
     (mu("[]"), 3, "friction.mu", "axis is empty; give at least one value"),
     (mu(".nan"), 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, not nan"),
@@ -73,7 +72,6 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (step("stop_early: no"), 5, "integrator.stop_early", "must be true, false or a finite number > 0, not 'no'"),
     (step("stop_early: 0"), 5, "integrator.stop_early", "must be true, false or a finite number > 0, not 0"),
     (SMALL + "measure: [colour]\n", 6, "measure[0]", "must be reversals, energy_error"),
-    (SMALL + "measure: [reversals, reversals]\n", 6, "measure", "duplicate measurement; name each once"),
     (SMALL + "measure: [reversals, reversal_times, {reversal_times: 3}]\n", 6, "measure", "duplicate measurement; name each once"),
     (SMALL + "measure: [{reversal_times: 3}]\n", 6, "measure[0]", "reversal_times is measured with the reversals; add reversals"),
     *((SMALL + f"measure: [reversals, {{reversal_times: {n}}}]\n", 6, "measure[1].reversal_times", f"must be a whole number from 1 to 1000, not {n}") for n in (0, 2.5)),
@@ -86,15 +84,11 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (small("{mu: [40, 60]}", "40"), 3, "friction", "must be a section with law, mu, speed"),
     (SMALL + "cases: nowhere.csv\n", 6, "cases", "nowhere.csv: no such file"),
     (SMALL + "cases: cells.parquet\n", 6, "cases", "cells.parquet: Parquet files are not supported; read it with pandas"),
-    (mu("[40, 60"), 3, "", "not YAML"),
-    (small("10.0", "!!python/name:os.system 1"), 2, "body.a", "a YAML tag or anchor; write the plain value"),
     (small("10.0", "&a 10.0"), 2, "body.a", "a YAML tag or anchor"),
     ("- 1\n- 2\n", 1, "", "a configuration is a mapping of keys to values"),
     (SMALL + "---\nname: b\n", 6, "", "not YAML"),
     *((SMALL + f"seed: {n}\n", 6, "seed", f"must be a whole number >= 0 and < 4294967296, not {n}") for n in (-1, 1.5, 2**32)),
     ("cases: {mu: [60]}\nbody: {b: [1, 2]}\n", 2, "body.b", "cannot be an axis together with cases"),
-    ("model: averaged\nfriction: {mu: 1e-320}\n", 2, "friction.mu", "must be at least 1e-300 for the averaged model"),
-    ("cases: {mu: [60, 0]}\nmodel: averaged\n", 1, "cases", "column mu: must be at least 1e-300 for the averaged model"),
     (mu("{normal: [5, 9]}") + "samples: 32\n", 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, but 9 of 32 samples"),
     (drawn("{normal: [0.05, -0.01]}"), 4, "start.n0.normal[1]", "must be the standard deviation, a finite"),
     (drawn("{uniform: [0.02, 0]}"), 4, "start.n0.uniform[1]", "must be the highest value, a finite number > 0.02"),
@@ -106,7 +100,6 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("Ixy: -2.0e-5", "Ixy: 6.0e-4")), 4, "body", "not positive definite"),
     (stone((" mass: 1.0,", "")), 4, "body.mass", "missing"),
     (stone(("offset: 0.01", "offset: 0.03")), 4, "body", "centre of mass outside the ellipsoid; keep |offset| < c (at a=0.2"),
-    (stone(("b: 0.03", "b: 0.012"), ("offset: 0.01", "offset: 0.002")), 4, "body", "upright rest is not stable"),
     (stone(("b: 0.03", "b: [0.01, 0.012]"), ("offset: 0.01", "offset: 0.002")), 4, "body", "offset > c - b²/c (at a=0.2, b=0.01"),
     (stone(("offset", "delta: 0.03, offset")), 4, "body.delta", "cannot be combined with Ixx, Ixy, Iyy, Izz; leave out either"),
     (stone(("units: SI\ngravity: 9.81\n", "")), 2, "body.mass", "is 1 in the paper's units; leave it out, or set units: SI"),
@@ -114,18 +107,13 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("coulomb", "coulumb")), 5, "friction.law", "did you mean coulomb?"),
     (stone(("law: coulomb, ", "law: viscous, ")), 5, "friction.speed", "does not belong to the law viscous"),
     (stone((" speed: 1.0e-3,", "")), 5, "friction.speed", "missing"),
-    (stone(("law: coulomb", "law: contensou")), 5, "friction.radius_contact", "missing"),
     (stone(("slip1: 0,", "n0: 1,")), 6, "start.n0", "with omega1, omega2, omega3, pitch, roll, slip2; give either n0, x0, y0 or angles"),
-    (stone(("roll: 0.5 deg", "roll: 30 min")), 6, "start.roll", "not '30 min'"),
     (stone(("roll: 0.5 deg", "roll: 91 deg")), 6, "start.roll", "< 1.5708, not 1.588"),
     (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "has no meaning with surface: paraboloid; give the elements of inertia instead"),
-    ("body: {surface: paraboloid, b: 0.2, Ixx: 1, Iyy: 1, Izz: 1}\nfriction: {mu: 1}", 1, "body.a", "missing"),
     (stone(BOWL, ("offset: 0.01", "offset: 0.02")), 4, "body", "centre of mass outside the paraboloid; keep offset < c (at a=0.01"),
-    (stone(("{a: 0.2", "{surface: paraboloid, a: 1.1")), 4, "body", "upright rest is not stable"),
     (stone(("model: slip", "model: averaged"), ("{a:", "{surface: paraboloid, a:")), 1, "model", "units: SI, surface: paraboloid; choose slip or noslip"),
     (stone(("t_end: 5", "t_end: 5, method: adams")), 7, "integrator.method", "model; choose dopri5 or auto"),
     # What is nearly a value with a unit.
-    (small("10.0", "12 cm"), 2, "body.a", "is in c here; give the number without cm, or set units: SI"),
     (small("[0.02, 0.05]", "[0.02, 3 rpm]"), 4, "start.n0", "is in sqrt(g/c) here; give the number without rpm"),
     (small("1500", "20 s"), 5, "integrator.t_end", "is in sqrt(c/g) here; give the number without s"),
     (stone(("mu: 0.5", "mu: 0.5 s/m")), 5, "friction.mu", "is a pure number here; leave out s/m"),
@@ -133,14 +121,13 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("c: 0.02", "c: 20 g")), 4, "body.c", "not '20 g'; its unit must be m, cm, mm, in or ft"),
     (stone(("c: 0.02", "c: 20+-1 mm")), 4, "body.c", "not '20+-1 mm'; write an error as {normal: [value, error]}"),
     (stone(("c: 0.02", "c: '1,250 mm'")), 4, "body.c", "not '1,250 mm'; write 1.250 mm or 1250 mm"),
-    (small("[40, 60]}", "1,5}"), 3, "friction.mu", "a comma ends a value in braces; write 1.5 for one"),
     (stone(("c: 0.02", "c: 2,5cm")), 4, "body.c", "a comma ends a value in braces; write 2.5cm for one"),
     (stone(("c: 0.02", "c: [2,5cm, 3cm]")), 4, "body.c", "a comma ends an item of a list; write 2.5cm"),
     (mu("1,5").replace("{mu: 1,5}", "\n  mu: 1,5"), 4, "friction.mu", "not '1,5'; write 1.5 or [1, 5]"),
     (mu("'60'"), 3, "friction.mu", "not '60'; leave out the quotes"),
     *(
         (mu(f"'{span}'"), 3, "friction.mu", f"not '{span}'; a range is written {{start: 20, stop: 60, num: 41}}")
-        for span in ("20..60", "20:60", "20 to 60", "20…60", "20..60:41", "20:60:41")
+        for span in ("20..60", "20 to 60", "20:60:41")
     ),
     (stone(("c: 0.02", "c: 20cm..30 cm")), 4, "body.c", "; a range is written {start: 20cm, stop: 30 cm, num: 41}, with the number"),
 ]  # fmt: skip
@@ -216,7 +203,6 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
 @pytest.mark.parametrize(
     ("table", "place", "said"),
     [
-        ("mu,detla\n60,1\n", "cells.csv:1:2: detla", "unknown parameter (did you mean delta?)"),
         ("mu,mu\n60,1\n", "cells.csv:1:2: mu", "duplicate column"),
         ("\nmu,detla\n60,1\n", "cells.csv:2:2: detla", "unknown parameter (did you mean delta?)"),
         ("mu,b\n60,wide\n", "cells.csv:2:2: b", "must be a finite number > 0 and < 1e+06, not 'wide'"),
@@ -225,7 +211,6 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("", "cells.csv", "empty; its first line has to name the columns"),
         ("mu,x0\n60,0.01\n", "small.yaml:3:9: start.x0", "is also a column of cells.csv; remove one of the two"),
         ('mu\n"60', "cells.csv", "not a readable CSV file"),
-        ("b\n2\n", "small.yaml:1:1: friction.mu", "missing"),
         ("a (kg),mu\n20,60\n", "cells.csv:1:1: a", "is in 'kg'; its unit must be m, cm, mm, in or ft"),
         ("a (cm),mu\n20,60\n", "small.yaml:2:1: cases.a", "is in c here; give the number without cm, or set units"),
         ("a,mu\n1,5,60\n", "cells.csv:2", "3 values, but 2 columns in line 1, with commas between them; use semicol"),
