@@ -31,11 +31,10 @@ ERRORS = (
 """What the last companion showed (`sweep.engine.errors.Errors`)."""
 
 NOTES = Layout((
-    "stage", "leg", "wary", "most", "step", "step_rule", "halvings", "brief", "step_before", *MET,
-    "repeats", "most_error", *ERRORS,
+    "stage", "leg", "wary", "step", "step_rule", "halvings", "step_before", *MET, "repeats", "most_error", *ERRORS,
 ))  # fmt: skip
-"""The notes on each cell. `leg`, `wary` and `most` belong to `sweep.engine.ending`; `halvings`, `brief`, `step_before`
-and what was met belong to `sweep.engine.failures`; the others belong to `sweep.engine.errors`."""
+"""The notes on each cell. `leg` and `wary` belong to `sweep.engine.ending`; `halvings`, `step_before` and what was met
+belong to `sweep.engine.failures`; the others belong to `sweep.engine.errors`."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ class Lives:
 
     def __init__(self, cells: Cells) -> None:
         self.notes = Table(np.zeros((len(cells.cells), len(NOTES.names))), NOTES)
-        self.notes["step"], self.notes["step_rule"], self.notes["most"] = cells.step, cells.step_rule, np.inf
+        self.notes["step"], self.notes["step_rule"] = cells.step, cells.step_rule
         self.notes["most_error"] = np.inf
         self.notes.set_columns(ERRORS, np.nan)
         self.cells = replace(cells, step=self.notes["step"], step_rule=self.notes["step_rule"])

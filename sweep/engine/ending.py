@@ -44,14 +44,13 @@ _WINDOW = 0.1
 _ROLLS = 0.5
 
 
-def begin(lives: Lives, rows: Array, images: Array, most: Array | float = np.inf) -> None:
-    """Let `images` at t = 0 run to their ends, or until `most` steps are done."""
+def begin(lives: Lives, rows: Array, images: Array) -> None:
+    """Let `images` at t = 0 run to their ends."""
     rules, table = lives.cells.rules, lives.cells.kernel.table(images)
-    first = most if rules.first_leg is None else np.minimum(most, whole_blocks(rules.first_leg / table["step"]))
+    first = np.inf if rules.first_leg is None else whole_blocks(rules.first_leg / table["step"])
     if rules.settles:
         watch(lives.take(rows), images)
     lives.note(rows, ("leg", "wary"), 0)
-    lives.notes["most"][rows] = most
     lives.enter(rows, RUN, images, settles=rules.settles, goal=first)
 
 
@@ -79,7 +78,7 @@ def _go_on(lives: Lives, rows: Array, *, settles: bool) -> None:
     table["status"], table["settles"] = RUNNING, settles
     lives.notes["wary"][rows] = not settles
     if settles:
-        table["goal"], lives.notes["leg"][rows] = np.minimum(table["steps"], lives.notes["most"][rows]), LATER
+        table["goal"], lives.notes["leg"][rows] = table["steps"], LATER
     lives.cells.images[rows] = table.images
 
 

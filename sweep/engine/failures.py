@@ -22,7 +22,6 @@ from sweep.kernels.build import APPROACH as COMPILED
 from sweep.kernels.build import build
 from sweep.kernels.failure import approach
 from sweep.kernels.kernel import FAILURE
-from sweep.kernels.layout import BLOCK
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import DIVERGED, FAILURES, RUNNING
@@ -33,8 +32,7 @@ ROUNDS, FALSE_ROUNDS = 3, 8
 spuriously, which makes its numbers worthless."""
 
 MOST_STEPS = 1e8
-"""Steps above which a repeat is not tried: a minute for one cell, or for all that fill the lanes next to it. If only
-the way to a failure is shorter, that alone is repeated."""
+"""Steps above which no further repeat is tried: a minute for one cell, or for all that fill the lanes next to it."""
 
 SAME = 1e-6
 """Largest time difference at which two runs meet the same failure, in sqrt(c/g)."""
@@ -98,7 +96,7 @@ def look_at(lives: Lives, rows: Array) -> Array:
     failed = cells.failed
     open_ = begun | failed if cells.rules.fixed else begun | failed | unsound(cells)
     fresh = rows[open_ & ~begun]
-    lives.note(fresh, (*MET, "brief"), np.array([RUNNING, 0, 0, 0, 0]))
+    lives.note(fresh, MET, np.array([RUNNING, 0, 0, 0]))
     at_start, nothing = _approach(lives, rows[failed]), rows[open_ & ~failed]
     concluded = after_approach(lives, at_start), _conclude(lives, nothing, Met.nothing(len(nothing)))
     return np.concatenate([rows[~open_], *concluded])
@@ -150,14 +148,13 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
         last, within = halvings == 1, notes["step_before"][rows]
     else:
         rounds = np.where(now.failed & ~met.agrees(before, np.inf), FALSE_ROUNDS, ROUNDS)
-        long, failed_late = 2 * table["steps"] > MOST_STEPS, 2 * table["done"] > MOST_STEPS
-        last = (halvings >= rounds) | (long & (~now.failed | failed_late))
+        last = (halvings >= rounds) | ((halvings > 0) & (2 * table["done"] > MOST_STEPS))
         within = np.where(last & ~unsound(now), np.inf, SAME)
     true = met.agrees(before, within)
     doubtful = ~true & (now.failed | unsound(now))
     over = ~doubtful | last
-    # With a fixed step, the run with half the step only confirms; a brief run that did not fail gives no result.
-    back = over & ((halvings > 0) if rules.fixed else (notes["brief"][rows] > 0) & ~true)
+    # With a fixed step, the run with half the step only confirms.
+    back = over & rules.fixed & (halvings > 0)
     here = rows[over]
     step, images = now.step[over], now.images[over]
     step[back[over]], images[back[over]] = notes["step_before"][rows[back]], lives.before[rows[back]]
@@ -166,7 +163,7 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
     if not rules.fixed:
         rule = np.where(doubtful[over], MISSED, REPEAT)
         notes["step_rule"][here] = np.where((halvings[over] > 0) | doubtful[over], rule, notes["step_rule"][here])
-    _halve(lives, rows[~over], take(met, ~over), np.zeros(1) if rules.fixed else long[~over])
+    _halve(lives, rows[~over], take(met, ~over))
     return np.asarray(here)
 
 
@@ -192,14 +189,11 @@ def _set_true(lives: Lives, rows: Array, images: Array, met: Met, before: Met, t
     lives.cells.images[rows], lives.notes["halvings"][rows] = images, 0
 
 
-def _halve(lives: Lives, rows: Array, met: Met, brief: Array) -> None:
-    """Rerun the cells `rows` with half the step; where `brief`, only up to the failure of the run before."""
+def _halve(lives: Lives, rows: Array, met: Met) -> None:
+    """Rerun the cells `rows` with half the step."""
     notes, now = lives.notes, lives.take(rows)
-    # A run may be stopped before the failure that lies ahead of it.
-    steps = np.maximum(now.times, met.time) / now.kernel.table(now.images)["step"]
-    most = np.where(brief, 2 * (steps + _BEYOND) + BLOCK, np.inf)
     lives.note(rows, MET, stack(met).T)
     notes["halvings"][rows] += 1
-    notes["brief"][rows], notes["step_before"][rows], lives.before[rows] = brief, now.step, now.images
+    notes["step_before"][rows], lives.before[rows] = now.step, now.images
     notes["step"][rows] = now.step / 2
-    ending.begin(lives, rows, lives.take(rows).start(), most)
+    ending.begin(lives, rows, lives.take(rows).start())
