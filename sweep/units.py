@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass
-from math import pi
+from dataclasses import astuple, dataclass
+from math import isfinite, nan, pi
 
 PAPER_UNITS, SI = "paper", "SI"
 """Systems of units: lengths in c, times in sqrt(c/g) and mass one, or SI."""
@@ -64,14 +64,19 @@ WRITTEN: dict[Unit, dict[str, float]] = {
     ACCELERATION: {"m/s2": 1.0, "cm/s2": 1e-2},
     DRAG: {"kg m2/s": 1.0, "N m s": 1.0, "g cm2/s": 1e-7},
 }
-"""Units that users may write, as multiples of SI units."""
+"""Units that users may write, as multiples of SI units; products of them are understood as well."""
+
+_FACTORS = {name: (scale, unit) for unit in (LENGTH, MASS, ANGLE, TIME) for name, scale in WRITTEN[unit].items()} | {
+    "radian": (1.0, ANGLE), "rpm": (pi / 30, SPIN), "N": (1.0, Unit(length=1, time=-2, mass=1)),
+}  # fmt: skip
+_FACTOR = r"(/?) ?([^\W\d_]+|°)(?: ?(-?\d+))?"
 
 NUMERAL = r"[-+−]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+−]?[0-9]+)?"
 """Decimal digits, with a hyphen or a minus sign."""
 
 # A comma before three digits may be a thousands separator.
 _WITH_COMMA = r"(?![-+−]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9]))[-+−]?[0-9]+,[0-9]+"
-_QUANTITY = re.compile(rf"({_WITH_COMMA}|{NUMERAL}) *(?:(?:±|\+/?-) *({_WITH_COMMA}|{NUMERAL}))? *([^\d,.].*)")
+_QUANTITY = re.compile(rf"({_WITH_COMMA}|{NUMERAL}) *(?:(?:±|\+/?-) *({_WITH_COMMA}|{NUMERAL}))? *([^\d,.].*|1 */.*)")
 
 
 def number(text: str) -> float | None:
@@ -79,19 +84,31 @@ def number(text: str) -> float | None:
     return float(text.replace("−", "-")) if re.fullmatch(NUMERAL, text) else None
 
 
-def factor(written: str, unit: Unit) -> float | None:
-    """Return the SI factor of a unit, such as 1000 for "g/cm3"; None if it is unknown or of another quantity."""
-    plain = re.sub(r"[ *·]+", " ", unicodedata.normalize("NFKC", written).replace("^", ""))
-    return WRITTEN.get(unit, {}).get(plain.strip())
+def factor(written: str, unit: Unit | None) -> float | None:
+    """Return the SI factor of a unit, such as 1000 for "g/cm3"; None if it is unknown or of another quantity.
+
+    Any order and notation of a product will do, such as "cm**-3*g".
+    """
+    plain = re.sub(r"[ *·]+", " ", unicodedata.normalize("NFKC", written).replace("^", "")).strip()
+    if plain in (known := WRITTEN.get(unit or NUMBER, {})):
+        return known[plain]
+    scale, powers = 1.0, [0, 0, 0, 0]
+    for over, name, power in re.findall(_FACTOR, plain):
+        size, one = _FACTORS.get(name, (nan, NUMBER))
+        times = int(power or 1) * (-1 if over else 1)
+        scale *= size**times
+        powers = [each + times * more for each, more in zip(powers, astuple(one), strict=True)]
+    same = bool(re.fullmatch(f"({_FACTOR} ?)+", plain)) and Unit(*powers) == unit
+    return scale if same and isfinite(scale) else None
 
 
-def quantity(text: str, unit: Unit) -> tuple[float, float] | None:
+def quantity(text: str, unit: Unit | None, own: str = "") -> tuple[float, float] | None:
     """Return a number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm" or "12,0±0,1cm".
 
-    The result is None if the text has another form.
+    The result is None if the text has another form. A number in the unit `own` is not converted.
     """
     found = _QUANTITY.fullmatch(text.strip())
-    scale = factor(found[3], unit) if found else None
+    scale = None if not found else 1.0 if found[3] == own else factor(found[3], unit)
     if not found or not scale:
         return None
     value, error = (number((part or "0").replace(",", ".")) or 0.0 for part in (found[1], found[2]))

@@ -53,7 +53,8 @@ def load_config(
     Parameters
     ----------
     config : path of a YAML file, its contents as a mapping, or a configuration.  An axis of a mapping may be
-        a list, tuple, range, NumPy array or `xarray.DataArray`, and `cases` a `pandas.DataFrame`
+        a list, tuple, range, NumPy array or `xarray.DataArray`, and `cases` a `pandas.DataFrame`; numbers may be
+        quantities of Pint or Astropy
     overrides : values that replace those of `config`, by path ("friction.mu") or, for a parameter or a setting of the
         integrator, by bare name ("mu")
     argument : function that returns the name of an override in error messages

@@ -177,7 +177,10 @@ class Config:
         own = self.described(name).get("units", "") if name in self.table else named(TIME, self.units)
         if not own:
             return f"is a pure number here; leave out {written}"
-        return "" if self.units == SI else f"is in {own} here; give the number without {written}, or set units: SI"
+        if self.units == SI:
+            units = self.table[name].units if name in self.table else TIME
+            return f"is in {own} here, not in {written}" if written == named(units, PAPER_UNITS) else ""
+        return "" if written == own else f"is in {own} here; give the number without {written}, or set units: SI"
 
     def document(self) -> dict[str, Any]:
         """Return the whole configuration, including defaults, as plain data."""

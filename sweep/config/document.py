@@ -11,6 +11,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import timedelta
 from itertools import accumulate, pairwise
 from math import inf, nan
 from pathlib import Path as FilePath
@@ -98,8 +99,9 @@ def plain_data(value: Any) -> Any:
     """Return a Python value as a YAML file could hold it: mappings, lists, text and numbers.
 
     Tuples, ranges and arrays become lists; an array is whatever NumPy can read as one, such as an `xarray.DataArray` or
-    a `pandas.Series`.  A `pandas.DataFrame` becomes a mapping of its columns.  Values of any other type are returned
-    unchanged; the schema refuses them.
+    a `pandas.Series`.  A `pandas.DataFrame` becomes a mapping of its columns.  Numbers with a unit (quantities of Pint
+    or Astropy, an array whose attributes have `units`, times) become texts such as "3.0 cm", and masked numbers None.
+    Values of any other type are returned unchanged; the schema refuses them.
     """
     if isinstance(value, Mapping):
         return {str(key): plain_data(item) for key, item in value.items()}
@@ -107,9 +109,32 @@ def plain_data(value: Any) -> Any:
         return [plain_data(item) for item in value]
     if hasattr(value, "columns") and hasattr(value, "to_dict"):  # a pandas DataFrame
         return plain_data(value.to_dict("list"))
+    if isinstance(value, timedelta):
+        return _with_unit(value.total_seconds(), "s")
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if kind == "m":
+        return _with_unit((np.asarray(value) / np.timedelta64(1, "s")).tolist(), "s")
+    if kind == "M":
+        return np.asarray(value).astype(str).tolist()
+    if hasattr(value, "magnitude") and hasattr(value, "units"):  # of Pint
+        return _with_unit(plain_data(value.magnitude), f"{value.units:~C}")
+    if hasattr(value, "value") and hasattr(value, "unit"):  # of Astropy
+        return _with_unit(plain_data(value.value), str(value.unit))
+    if isinstance(attributes := getattr(value, "attrs", None), Mapping):
+        inside = value.data if hasattr(value, "data") else np.asarray(value)  # xarray may hold quantities
+        return _with_unit(plain_data(inside), attributes.get("units", ""))
+    if isinstance(value, np.ma.MaskedArray):
+        return value.tolist()
     if hasattr(value, "__array__"):
         return np.asarray(value).tolist()
     return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+
+def _with_unit(plain: Any, unit: object) -> Any:
+    """Add a unit to the numbers of a value; "", "1" and "dimensionless" are none."""
+    if isinstance(plain, list):
+        return [_with_unit(item, unit) for item in plain]
+    return f"{plain!r} {unit}" if is_number(plain) and unit not in ("", "1", "dimensionless") else plain
 
 
 def read(path: FilePath) -> Document:

@@ -122,12 +122,14 @@ def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], st
 def in_si(units: Unit | str, raw: Any) -> tuple[Any, str]:
     """Convert texts with units, such as "0.5 deg", to numbers in SI, also in a list, a range or a distribution.
 
+    Numbers in the paper's unit, as its datasets have them, are not converted.
+
     Returns
     -------
     The converted value, and the unit as the user wrote it, except for angles; "" if there is none, or if a user's model
     gives `units` as text, which are the same in all systems.
     """
-    unit = unit_of(units)
+    unit, own = unit_of(units), units if isinstance(units, str) else units.paper
     seen: list[str] = []
 
     def convert(part: Any, key: str = "") -> Any:
@@ -135,7 +137,7 @@ def in_si(units: Unit | str, raw: Any) -> tuple[Any, str]:
             return [item if key == "lognormal" and i else convert(item) for i, item in enumerate(part)]
         if isinstance(part, dict):
             return {key: convert(item, key) for key, item in part.items()}
-        found = quantity(part, unit) if unit and isinstance(part, str) else None
+        found = quantity(part, unit, own) if isinstance(part, str) else None
         if not found or found[1]:  # only distributions have errors
             return part
         if unit != ANGLE and units is unit:
