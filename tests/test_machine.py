@@ -96,11 +96,7 @@ def test_many_combinations_in_the_explorer() -> None:
     run_machine(asked("SEED", 2), asked("RUNS", 8), browser=True)
 
 
-# Each refers to what only a user can bring.
-NOT_ALONE = {"model_sha256"}
-
-
-@pytest.mark.parametrize("path", sorted(PATHS.keys() - NOT_ALONE))
+@pytest.mark.parametrize("path", sorted(PATHS))
 def test_each_key_of_a_configuration_is_drawn(path: str) -> None:
     """With a shipped configuration, or with one other choice beside the paper's, some drawn value is accepted."""
     others = [(name, flat) for name, flat in draws.shipped().items()]

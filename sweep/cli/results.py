@@ -75,7 +75,7 @@ def info(file: Path, whole: bool) -> None:
 @FILE
 @click.option("--port", type=click.IntRange(1, 65535), help="Port of the page [default: the first free one from 5006].")
 @click.option("--no-browser", is_flag=True, help="Print the address without opening a browser.")
-@click.option("--model", help="Python file or entry point of the user-defined model of the dataset; its code is run.")
+@click.option("--model", help="Python file of the user-defined model of the dataset; its code is run.")
 def explore(file: Path, port: int | None, no_browser: bool, model: str | None) -> None:
     """Explore the maps of a dataset in the browser.
 

@@ -48,7 +48,7 @@ def load_config(
 ) -> Config:
     """Read and check a configuration.
 
-    If the model is a file or an entry point, its code is run.
+    If the model is a file, its code is run.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ def _opened(
 ) -> tuple[document.Document, Origin | None]:
     """Open the document of a configuration, and load its model if it is user-defined."""
     source = _source(config)
-    for key in {"model", "model_sha256"} & set(overrides):  # on which the code to run depends
-        source.set((key,), plain_data(overrides[key]), argument(key))
+    if "model" in overrides:  # on which the code to run depends
+        source.set(("model",), plain_data(overrides["model"]), argument("model"))
     return source, user_models.named(source, announce)
 
 

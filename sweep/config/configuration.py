@@ -190,9 +190,7 @@ class Config:
         kept = [name for name in varying if name not in FIRST_AXES or name in self.distributions]
         written = [table[name].place[0] for name in kept]
         found: dict[str, Any] = {key: {} for key in (*written, *sections(table))}
-        top: dict[str, Any] = {"model_sha256": self.origin.digest} if self.origin else {}
-        if self.units != PAPER_UNITS and self.of_rattlebacks:
-            top["units"] = self.units
+        top = {"units": self.units} if self.units != PAPER_UNITS and self.of_rattlebacks else {}
         if self.law != PAPER_LAW and not self.origin:
             found["friction"] |= {"law": self.law}
         if self.surface != ELLIPSOID.name:
@@ -233,10 +231,11 @@ class Config:
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the numbers, unlike the name or the pictures."""
         decisive = self.document()
-        # The content of a model file counts, through its SHA-256, and not its location.
+        # The content of a model file counts, and not its location.
         for key in ("name", "max_failed_fraction", "picture", "cases", *(["model"] if self.origin else [])):
             decisive.pop(key, None)
-        text = json.dumps([decisive, list(self.axes), self.cases or None], sort_keys=True)
+        digest = [self.origin.digest] if self.origin else []
+        text = json.dumps([decisive, list(self.axes), self.cases or None, *digest], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -39,8 +39,6 @@ def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator
         if "units" in values.model_fields_set:
             yield ("units",), "the file of the model gives the units; leave them out"
         return
-    if not origin and values.model_sha256 is not None:
-        yield ("model_sha256",), f"the {values.model} model does not come from a file; leave it out"
     if not origin and physics.beyond and values.model not in BASES:
         unknown = ", ".join(physics.beyond)
         yield ("model",), f"the {values.model} model does not support {unknown}; choose {either(BASES)}"

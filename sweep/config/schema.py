@@ -179,12 +179,8 @@ class _Top(Strict):
     )  # fmt: skip
     model: Annotated[
         Literal[tuple(TIERS)],  # type: ignore[valid-type]
-        Allowed(f"{', '.join(TIERS)}, a Python file such as my_model.py or an entry point of a package"),
-    ] = Field(default="slip", description="model to integrate; the code of a file or a package is run")
-    model_sha256: Annotated[str | None, Allowed("64 hexadecimal digits")] = Field(
-        default=None, pattern="^[0-9a-f]{64}$",
-        description="SHA-256 that the file or package of `model` must have; datasets record it",
-    )  # fmt: skip
+        Allowed(f"{', '.join(TIERS)} or a Python file such as my_model.py"),
+    ] = Field(default="slip", description="model to integrate; the code of a file is run")
     units: Literal[PAPER_UNITS, SI] = Field(  # type: ignore[valid-type]
         default=PAPER_UNITS, description="lengths in c, times in sqrt(c/g) and mass 1, or SI"
     )

@@ -1,4 +1,4 @@
-"""Loads a user-defined model that a configuration names: a Python file, or an entry point.
+"""Loads a user-defined model that a configuration names: a Python file.
 
 Its code runs as soon as the configuration is read, so a configuration taken from a dataset must not name one.
 """
@@ -40,7 +40,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
     if not isinstance(name, str) or name in TIERS:
         return None
     origin: Origin | None = source.known.get(("model", name))
-    if origin is None and not name.endswith(SUFFIX) and (origin := loading.entry_point(name)) is None:
+    if origin is None and not name.endswith(SUFFIX):
         return None  # the schema refuses it later
     if announce is None:
         message = "refusing to run user code named inside a dataset"
@@ -49,10 +49,6 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
         path, text = source.read_beside("model", name)
         origin = Origin.of_file(name, str(path), text)
     source.known["model", name] = origin
-    pinned = source.values.get("model_sha256")
-    if pinned is not None and pinned != origin.digest:
-        message = f"{pinned!r}, but {brief(name)} has {origin.digest}; pin that one, or leave it out"
-        raise InputError([source.fault(("model_sha256",), message)])
     announce(f"running the code of {origin.place} (SHA-256 {origin.digest[:16]}…)")
     for p in loading.load(origin).own_parameters:
         if wrong := [word for word in (p.name, p.section) if word in TAKEN]:

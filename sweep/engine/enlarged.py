@@ -71,7 +71,9 @@ def reason_against(config: Config, found: Identity, wanted: Identity, there: xr.
     if _is_edited(config, there):
         return edited
     old, new = (_settings(parse_value(each.config, "dataset"), config.table) for each in (found, wanted))
-    # In a user-defined model, `model_sha256` identifies what `model` only names.
+    if config.origin and there.attrs.get("model_sha256") != config.origin.digest:
+        return f"another text of {config.origin.place}"
+    # The text identifies a user-defined model, which `model` only names.
     free = _FREE | ({"model"} if config.origin else set())
     changed = {key for key in {**old, **new} if old.get(key) != new.get(key)} - free
     less = [each for each in old["measure"] if each not in new["measure"]]

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from sweep.config import Fault, InputError
-from sweep.config.user_models import SUFFIX
+from sweep.config.document import text_of
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
 from sweep.faults import brief
-from sweep.models.user.loading import entry_point
+from sweep.models.origin import Origin
 from sweep.results.configuration import configuration
 
 Announce = Callable[[str], None]
@@ -22,7 +22,7 @@ class Setup:
 
     Parameters
     ----------
-    model : the file or entry point of a user's model; its code runs
+    model : the file of a user's model; its code runs
     announce : called with a line of text before it runs
 
     Raises
@@ -32,9 +32,8 @@ class Setup:
     """
 
     def __init__(self, source: Source, model: str | None = None, announce: Announce | None = None) -> None:
-        # The dataset may come from anybody: a model in it that is a file or an entry point runs only if the user names
-        # it.
-        config = configuration(source.dataset, *((_named(source, model), announce) if model else ()))
+        # The dataset may come from anybody: a model file that it names runs only if the user names it.
+        config = configuration(source.dataset, *((_checked(source, model), announce) if model else ()))
         if not config.simulated:
             raise InputError([])
         medians = config.at_medians
@@ -59,18 +58,20 @@ def usable(source: Source) -> Setup | None:
         return None
 
 
-def _named(source: Source, model: str) -> dict[str, str]:
-    """The keys by which the configuration names the user's model, which runs only if its hash is the dataset's.
+def _checked(source: Source, model: str) -> str:
+    """Return the path of the user's model, which may run only if its hash is the dataset's.
 
     The file name in the dataset is ignored, because the dataset may come from anybody.
     """
-    wanted, words = source.dataset.attrs.get("model_sha256"), ""
+
+    def refusal(words: str) -> InputError:
+        return InputError([Fault("", None, None, ("--model",), words)])
+
+    path, wanted = Path(model).absolute(), source.dataset.attrs.get("model_sha256")
     if wanted is None:
-        words = f"the model of {source.name} is not a user's; leave the option out"
-    elif model.endswith(SUFFIX):
-        model = str(Path(model).absolute())
-    elif entry_point(model) is None:
-        words = f"{brief(model)} is neither a Python file nor an entry point of an installed package"
-    if words:
-        raise InputError([Fault("", None, None, ("--model",), words)])
-    return {"model": model, "model_sha256": str(wanted)}
+        raise refusal(f"the model of {source.name} is not a user's; leave the option out")
+    text = text_of(path, lambda reason: refusal(f"{brief(str(path))}: {reason}"))
+    if (found := Origin.of_file(model, str(path), text).digest) != wanted:
+        words = f"has the SHA-256 {found}, not the dataset's {wanted}; name the file that made it"
+        raise refusal(f"{brief(str(path))} {words}")
+    return str(path)

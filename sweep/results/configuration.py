@@ -15,7 +15,7 @@ from sweep.results.kind import RUN, TRAJECTORY, kind, parameters
 
 
 def configuration(
-    dataset: xr.Dataset, model: Mapping[str, str] | None = None, announce: Callable[[str], None] | None = None
+    dataset: xr.Dataset, model: str | None = None, announce: Callable[[str], None] | None = None
 ) -> Config:
     """Return the configuration of a dataset, or of the part of it that was selected.
 
@@ -23,7 +23,7 @@ def configuration(
 
     Parameters
     ----------
-    model : the keys that name a user-defined model, if it is to run
+    model : the file of a user-defined model, if it is to run
     announce : called with a message before user code runs; None to refuse a user-defined model
 
     Raises
@@ -36,7 +36,7 @@ def configuration(
         raise fault_of("a configuration is a mapping of keys to values", "config")
     cases = values.pop("cases", None)
     selected = _selected(dataset, values, of_table=cases is not None)
-    named = dict(model or {})
+    named = {"model": model} if model else {}
     return load_config(
         values, selected | named, argument=lambda key: "--model" if key in named else key, announce=announce
     )

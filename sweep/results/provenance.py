@@ -20,7 +20,7 @@ import llvmlite.binding
 import numba
 
 from sweep.config import Config
-from sweep.faults import FileError, printable
+from sweep.faults import FileError, either, printable
 from sweep.jit import vector_bits
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.results import kind
@@ -30,6 +30,10 @@ _PACKAGE = Path(__file__).parent.parent
 
 _SHOWING = {"plots", "explorer", "cli", "report", "reproduce", "bench"}
 """Packages that only request or show numbers."""
+
+
+_UNSEEN = {r"^cases: ": "table of cases", r"^model: .*\.py$": "text of the model's file"}
+"""Inputs that a configuration names but does not contain, by a pattern of the line that names them."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,8 @@ class Identity:
             old, new = (c.config.splitlines() for c in (self, other))
             changed = [f"- {printable(line.strip())}" for line in old if line not in new]
             changed += [f"+ {printable(line.strip())}" for line in new if line not in old]
-            of_cases = re.search(r"^cases: ", other.config, re.MULTILINE)
-            changed = changed or [f"the {'table of cases' if of_cases else 'order of the axes'} differs"]
+            unseen = [name for key, name in _UNSEEN.items() if re.search(key, other.config, re.MULTILINE)]
+            changed = changed or [f"the {either(unseen or ['order of the axes'])} differs"]
             return "another configuration:\n  " + "\n  ".join(changed)
         if self.versions != other.versions:
             return f"other versions: {self.versions or 'unknown'}, now {other.versions}"
@@ -121,7 +125,7 @@ def provenance(
 
 
 def _brought(config: Config) -> dict[str, str]:
-    """Describe a user-defined model or law: its kind, its file or entry point, its SHA-256, and its parameters."""
+    """Describe a user-defined model or law: its kind, its file, its SHA-256, and its parameters."""
     if not (origin := config.origin):
         return {}
     return {

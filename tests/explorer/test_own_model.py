@@ -68,9 +68,9 @@ def test_no_other_code_is_run(source: Source, folder: Path, tiny: Path, monkeypa
     bare = Source(source.dataset.drop_attrs(deep=False).assign_attrs(config=source.dataset.attrs["config"]), "bare.nc")
     digest = source.dataset.attrs["model_sha256"]
     for dataset, model, message in (
-        (source, folder / "other.py", f"--model: '{digest}', but .*other.py has [0-9a-f]{{64}};"),
+        (source, folder / "other.py", f"--model: .*other.py has the SHA-256 [0-9a-f]{{64}}, not .* {digest};"),
         (source, folder / "missing.py", "--model: .*no such file"),
-        (source, "sliip", "--model: .*sliip is neither a Python file nor an entry point"),
+        (source, "sliip", "--model: .*sliip: no such file"),
         (bare, folder / "pendulum.py", "--model: the model of bare.nc is not a user's; leave the option out$"),
         (open_source(tiny), folder / "pendulum.py", "--model: the model of .* is not a user's; leave the option out$"),
     ):

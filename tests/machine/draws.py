@@ -160,7 +160,7 @@ def fields() -> dict[str, Any]:
     return flattened(sections) | {key: v for key, v in schema["properties"].items() if key not in sections}
 
 
-OTHERWISE = [path for path in fields() if path in PATHS and path not in PHYSICAL and path != "model_sha256"]
+OTHERWISE = [path for path in fields() if path in PATHS and path not in PHYSICAL]
 """Keys of what is not physical: each counts as much as all parameters together, which are alike."""
 
 

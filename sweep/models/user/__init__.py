@@ -1,1 +1,1 @@
-"""Users' models: loaded from a file or an entry point, checked, tried out, with errors traced to their line."""
+"""Users' models: loaded from a file, checked, tried out, with errors traced to their line."""

@@ -20,21 +20,19 @@ def blamed(origin: Origin | None, *, always: bool = False) -> Iterator[None]:
     except InputError:
         raise
     except Exception as error:
-        place, line = _place(error, origin) if origin else ("", None)
-        if origin is None or not (place or always):
+        line = _line(error, origin) if origin else None
+        if origin is None or (line is None and not always):
             raise
-        raise fault_of(_words(error), file=place or origin.place, line=line) from None
+        raise fault_of(_words(error), file=origin.place, line=line) from None
 
 
-def _place(error: Exception, origin: Origin) -> tuple[str, int | None]:
-    """File and line in the user's code, from Python's traceback or Numba's message; "" if the error comes from
-    elsewhere."""
-    known = {abspath(file): file for file in origin.files}
+def _line(error: Exception, origin: Origin) -> int | None:
+    """Line in the user's code, from Python's traceback or Numba's message; None if the error comes from elsewhere."""
     chain = filter(None, (error, error.__cause__))
     lines = [(f.f_code.co_filename, n) for each in chain for f, n in traceback.walk_tb(each.__traceback__)]
     lines += compiler_said(error)[0]
-    found = [(known[abspath(file)], n) for file, n in lines if abspath(file) in known]
-    return found[-1] if found else ("", None)
+    found = [n for file, n in lines if abspath(file) == abspath(origin.place)]
+    return found[-1] if found else None
 
 
 def _words(error: Exception) -> str:

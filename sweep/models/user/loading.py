@@ -1,4 +1,4 @@
-"""Load users' models from a Python file, or from an installed package by an entry point.
+"""Load users' models from a Python file.
 
 Loading a model runs its code, so nothing here may be called with a name that the user has not given.
 """
@@ -9,7 +9,6 @@ import linecache
 import sys
 from dataclasses import replace
 from functools import cache
-from importlib import metadata
 from types import ModuleType
 
 from sweep.faults import fault_of
@@ -22,21 +21,10 @@ from sweep.models.user.blame import blamed
 from sweep.models.variants import Physics, SlipWith
 from sweep.parameters import PARAMETERS, Parameter
 
-GROUP = "sweep.models"
-"""Group of the entry points by which packages bring models."""
-
-
-def entry_point(name: str) -> Origin | None:
-    """The model that an installed package offers under a name; None if there is none.  Nothing is imported."""
-    found = metadata.entry_points(group=GROUP, name=name)
-    if not found:
-        return None
-    return Origin.of_package(name, next(iter(found)).value)
-
 
 @cache
 def load(origin: Origin) -> Model | SlipWith:
-    """Run the code of a file or a package, once in a process, and return the model that it defines.
+    """Run the code of a file, once in a process, and return the model that it defines.
 
     Raises
     ------
@@ -45,7 +33,7 @@ def load(origin: Origin) -> Model | SlipWith:
     """
     made: Model | SlipWith
     with blamed(origin):
-        made = _file(origin) if origin.is_file else _imported(origin)
+        made = _file(origin)
         trial.check(made, origin)
     if isinstance(made, SlipWith):
         return replace(made, origin=origin)
@@ -71,13 +59,6 @@ def _file(origin: Origin):
     except SystemExit as error:
         raise RuntimeError("it ends the program") from error
     return getattr(module, "MODEL", None)
-
-
-def _imported(origin: Origin):
-    try:
-        return next(iter(metadata.entry_points(group=GROUP, name=origin.name))).load()
-    except (ImportError, AttributeError) as error:
-        raise fault_of(str(error), file=f"entry point {origin.name} = {origin.place}") from None
 
 
 def table(origin: Origin | None) -> dict[str, Parameter]:
