@@ -5,7 +5,8 @@
 Runs each configuration with the sources of the revision and with those of this checkout, in processes of their own.
 Each takes the configuration of its own checkout.  Every variable, coordinate and attribute is compared, but for those
 that say when, where and from which sources a dataset was made.  Differences that are meant are left aside, and named:
-variables that have ended (`ENDED`), and attributes that are words (`WORDS`).  Exits with 1 if anything else differs.
+variables that only one of them has (`OTHERS`), and attributes that are words (`WORDS`).  Exits with 1 if anything else
+differs.
 
 All of them take about twenty minutes on two cores, less where FOLDER holds results already.
 """
@@ -29,10 +30,16 @@ ORIGIN = {
     "trajectories_per_second", "model_place", "model_sha256", "cpu", "threads",
 }  # fmt: skip
 
-ENDED = ("verified_*", "reversals_low", "reversals_high", "film_lean_?")
-"""Patterns of variables, and attributes of datasets, that older revisions have."""
+OTHERS = (
+    "verified_*", "reversals_low", "reversals_high", "film_lean_?", "inferred", "raw_reversals", "t_first_reversal",
+    "reversal_time_reason", "lyapunov*", "cycle_*", "misfit", "reversal_times", "reversal",
+)  # fmt: skip
+"""Patterns of variables, and attributes of datasets, that only older or only newer revisions have."""
 
-WORDS = ("config", "config_hash", "coordinates", "pictured", "sweep_kind", "title", "units", "long_name", "description")
+WORDS = (
+    "config", "config_hash", "coordinates", "measured", "pictured", "sweep_kind", "title", "units", "long_name",
+    "description",
+)  # fmt: skip
 """Attributes in words: the configuration, whose keys may have ended, and what a dataset or a variable is."""
 
 
@@ -65,7 +72,7 @@ def _attributes(place: str, before: netCDF4.Dataset, after: netCDF4.Dataset) -> 
 
 def meant(difference: str) -> bool:
     """Tell whether a difference is one that is left aside: no value of a variable that both datasets have."""
-    return difference.rpartition(":")[2] in WORDS or any(fnmatch(difference, pattern) for pattern in ENDED)
+    return difference.rpartition(":")[2] in WORDS or any(fnmatch(difference, pattern) for pattern in OTHERS)
 
 
 def run(checkout: Path, config: str, folder: Path) -> Path:

@@ -42,7 +42,7 @@ class Trace:
 
     def __init__(self) -> None:
         self.nodes: dict[tuple[Any, ...], Symbol] = {}
-        self.names: dict[str, Any] = {"np": np, "inf": np.inf, "nan": np.nan}
+        self.names: dict[str, Any] = {"np": np}
 
     def node(self, template: str, *inputs: Any) -> Symbol:
         """The expression `template` of `inputs`, symbols or numbers."""
