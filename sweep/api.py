@@ -244,9 +244,9 @@ def critical(
 
     Returns
     -------
-    Dataset over the axes without n0. Each `n_c2_*_simulated` comes with the ends of its bracket, `*_inner` and
-    `*_outer`. A `*_reason` says why n_c1 or n_c2 is NaN; `critical_reason` is the first of the four that is not
-    `exists`.
+    Dataset over the axes without n0, and over the `sign` of the spin, 1 and -1: `n_c1_linear` by the eigenvalues,
+    `n_c2_simulated` with the ends of its `n_c2_bracket`, and `n_c_reason`, which gives the reason where one of them is
+    missing.
 
     Raises
     ------
@@ -256,8 +256,8 @@ def critical(
     Examples
     --------
     >>> spins = sweep.critical({"friction": {"mu": 60}}, bracket=0.1)
-    >>> f"{float(spins.n_c2_plus_simulated):.3f}"
-    '0.005'
+    >>> spins.n_c2_simulated.sel(sign=1).round(3).item()
+    0.005
     """
     from sweep.studies.critical import critical
 

@@ -59,7 +59,7 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     ranges = _stable_ranges(tier, bodies.columns()) if LINEAR in tier.offers else np.full((7, bodies.size), np.nan)
     n_c1 = ranges[1::-1]
     if LINEAR in tier.offers or not tier.origin:
-        found["n_c1_plus_linear"], found["n_c1_minus_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan)
+        found["n_c1_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan).T
     if REVERSAL_TIME in tier.offers and any(isinstance(each, ReversalTimes) for each in chosen(measure)):
         found["t_first_reversal_predicted"] = _first_reversal(tier, grid.columns(), n_c1[:, place])
     if Foreseen.name in measure:
@@ -135,7 +135,7 @@ def _formulas(tier: Tier, grid: Grid) -> dict[str, Array]:
     if set(bodies) <= PAPER_PARAMETERS.keys() and not (isinstance(tier, Model) and tier.origin):
         found["form_factor"] = analytic.form_factor(bodies)
     if FORMULAS in tier.offers:
-        plus, minus = analytic.critical_spins(bodies)
         found["reversals_predicted"] = analytic.reversal_count(grid.columns())
-        found |= {"n_c1_plus": plus, "n_c1_minus": minus, "n_c2_plus": 2 * plus, "n_c2_minus": 2 * minus}
+        found["n_c1"] = np.stack(analytic.critical_spins(bodies), axis=1)
+        found["n_c2"] = 2 * found["n_c1"]
     return found

@@ -25,8 +25,8 @@ class Variable:
     """Meaning of each value, for a variable that takes only a few integer values."""
     per_body: bool = False
     """Whether it has one value per body, that is, does not depend on the parameters of the start."""
-    along: str | None = None
-    """Name of one further dimension, after those of the cells; its coordinate counts from one."""
+    along: tuple[str, ...] = ()
+    """Names of further dimensions, after those of the cells."""
     of_sound_runs: bool = False
     """Whether it is undefined for a trajectory that failed, whatever number the array holds there."""
 

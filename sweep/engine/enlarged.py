@@ -55,7 +55,7 @@ class Earlier:
         grid = _grid(self.dataset)
         at, (_, body) = self.cells[cells], grid.bodies()
         for name, (_, spec) in dataset.layout(grid, set(map(str, self.dataset.data_vars))).items():
-            tail = (self.dataset.sizes[spec.along],) if spec.along else ()
+            tail = [self.dataset.sizes[dim] for dim in spec.along]
             arrays[name] = self.dataset[name].values.reshape(-1, *tail)[body[at] if spec.per_body else at]
         return cells, arrays
 
@@ -98,7 +98,7 @@ def _is_edited(config: Config, there: xr.Dataset) -> bool:
         return True
     written = dataset.layout(grid, set(map(str, there.data_vars)))
     return any(
-        there[name].dims != (*over.dims, *filter(None, [spec.along])) or there[name].dtype != np.dtype(spec.dtype)
+        there[name].dims != (*over.dims, *spec.along) or there[name].dtype != np.dtype(spec.dtype)
         for name, (over, spec) in written.items()
     )
 

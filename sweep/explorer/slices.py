@@ -17,6 +17,7 @@ from sweep.faults import FileError
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe
+from sweep.results.dataset import FURTHER
 from sweep.results.kind import kind, opened
 from sweep.results.netcdf import open_dataset
 
@@ -56,7 +57,7 @@ class Source:
 
     def __init__(self, dataset: xr.Dataset, name: str = "dataset") -> None:
         cells = dataset["status"] if "status" in dataset else next(iter(dataset.data_vars.values()), None)
-        dims = () if cells is None else tuple(str(d) for d in cells.dims)
+        dims = () if cells is None else tuple(str(d) for d in cells.dims if d not in FURTHER)
         of_kind = kind(dataset)
         what = "no axis" if not dims else of_kind.words if of_kind and not of_kind.explored else ""
         if what:
@@ -68,7 +69,7 @@ class Source:
         ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in dims if d in dataset.coords}
         self.dataset = dataset.isel({d: o for d, o in ascending.items() if (np.diff(o) < 0).any()})
         # Those of the cells, followed by those along which a variable has several values per cell.
-        of_cells = [v.dims for v in self.dataset.data_vars.values() if set(dims) & set(v.dims)]
+        of_cells = [v.dims for v in self.dataset.data_vars.values() if set(dims) & set(v.dims) and "end" not in v.dims]
         self.axes = {d: PlacedAxis(d, along(self.dataset, d)) for d in map(str, chain(dims, *of_cells))}
 
     @cached_property

@@ -27,15 +27,15 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def draw(dataset: xr.Dataset) -> Picture:
-    """Critical spins by formula, eigenvalues and simulation, over the longest axis."""
-    dims = sorted(map(str, dataset["critical_reason"].dims), key=lambda d: -dataset.sizes[d])
-    check(dataset, dims, "critical_reason")
+    """Draw critical spins by formula, eigenvalues and simulation, over the longest axis."""
+    dims = sorted((str(d) for d in dataset["n_c_reason"].dims if d != "sign"), key=lambda d: -dataset.sizes[d])
+    check(dataset, dims, "n_c_reason")
     x = dims[0] if dims else ""
     panels = indices(dataset, dims[1:])
     figure, frames = framed(dataset, panels[:MAX_PANELS], x)
     styles = {
-        f"{name}_{side}{suffix}": {"color": colour, "linewidth": 1, **style}
-        for (name, colour), side, (suffix, (_, style)) in product(_COLOURS.items(), ("plus", "minus"), _SOURCES.items())
+        f"{name}{suffix}": {"color": colour, "linewidth": 1, **style}
+        for (name, colour), (suffix, (_, style)) in product(_COLOURS.items(), _SOURCES.items())
     }
     shown = _found(dataset, styles)
     for axes, chosen in frames:
@@ -51,7 +51,8 @@ def draw(dataset: xr.Dataset) -> Picture:
                 values, places = between[variable], between[variable][x].values
             if len(places) == 1 and "marker" not in styles[variable]:
                 places = Axis(x, at).edges  # a line of one point would be invisible
-            axes.plot(places, np.broadcast_to(values.values, places.shape), gid=variable, **styles[variable])
+            for _, spins in theory.by_sign(values):
+                axes.plot(places, np.broadcast_to(spins.values, places.shape), gid=variable, **styles[variable])
         zero_line(axes)
         axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
         if not there:
@@ -59,8 +60,7 @@ def draw(dataset: xr.Dataset) -> Picture:
         axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
     names = {f"{theory.WORDS[name]} beyond {name}": colour for name, colour in _COLOURS.items()
              if any(variable.startswith(name) for variable in shown)}  # fmt: skip
-    sources = [drawn for suffix, drawn in _SOURCES.items()
-               if shown & {f"{name}_{side}{suffix}" for name in _COLOURS for side in ("plus", "minus")}]  # fmt: skip
+    sources = [drawn for suffix, drawn in _SOURCES.items() if shown & {f"{name}{suffix}" for name in _COLOURS}]
     figure.explain([
         *(Line2D([], [], color=colour, linewidth=4, label=words) for words, colour in names.items()),
         *(Line2D([], [], color="0.3", linewidth=1, label=words, **style) for words, style in sources),
@@ -74,9 +74,9 @@ def _found(dataset: xr.Dataset, names: Iterable[str]) -> set[str]:
 
 
 def _why_none(dataset: xr.Dataset) -> str:
-    """List the reasons why there is no critical spin, with the number of bodies for each."""
-    if not (meanings := labels.flag_words(dataset, "critical_reason")):
+    """List the reasons why there is no critical spin, with the number of spins for each."""
+    if not (meanings := labels.flag_words(dataset, "n_c_reason")):
         return "no critical spin"
-    codes, counts = np.unique(dataset["critical_reason"], return_counts=True)
+    codes, counts = np.unique(dataset["n_c_reason"], return_counts=True)
     reasons = [f"{meanings.get(code, code)} ({n})" for code, n in zip(codes.tolist(), counts.tolist(), strict=True)]
     return f"no critical spin: {', '.join(reasons)}"

@@ -70,7 +70,7 @@ def _evaluated(
     grid = Grid({name: np.array(values) for name, values in axes}, {**starts, **dict(fixed)})
     predicted = predict(config.tier, grid).variables
     return {
-        name: xr.DataArray(values.reshape(grid.shape), grid.axes, grid.dims)
+        name: xr.DataArray(values.reshape(*grid.shape, 2), {**grid.axes, "sign": [1, -1]}, (*grid.dims, "sign"))
         for name, values in predicted.items()
         if name.startswith("n_c")
     }

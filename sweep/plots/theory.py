@@ -5,8 +5,9 @@ This needs the dataset alone, and no plotting library.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -51,18 +52,24 @@ class Line:
     """The label on it: n_c1⁺ and the like, or the count that begins on a boundary."""
 
 
-def critical_spins(dataset: xr.Dataset, name: str) -> Iterator[tuple[str, xr.DataArray, str]]:
-    """The symbol, values and source of n_c1 or n_c2, for both signs, as far as the dataset has them."""
-    for side, sign in (("plus", "⁺"), ("minus", "⁻")):
-        for suffix, source in _SOURCES[name]:
-            if f"{name}_{side}{suffix}" in dataset:
-                yield f"{name}{sign}", dataset[f"{name}_{side}{suffix}"], source
-                break
+def critical_spins(known: Mapping[Any, xr.DataArray], name: str) -> Iterator[tuple[str, xr.DataArray, str]]:
+    """Yield the symbol, values and source of n_c1 or n_c2 for each sign, from the best source in `known`."""
+    for suffix, source in _SOURCES[name]:
+        if f"{name}{suffix}" in known:
+            yield from ((f"{name}{sign}", values, source) for sign, values in by_sign(known[f"{name}{suffix}"]))
+            return
+
+
+def by_sign(spins: xr.DataArray) -> Iterator[tuple[str, xr.DataArray]]:
+    """Yield the sign and the values of critical spins for each sign that they have."""
+    if "sign" in spins.coords:
+        each = spins if "sign" in spins.dims else spins.expand_dims("sign")
+        yield from (("⁺" if one["sign"] > 0 else "⁻", one.drop_vars("sign")) for one in each.transpose("sign", ...))
 
 
 def levels(one: xr.Dataset) -> list[tuple[str, str, float, str]]:
     """The name, symbol, value and source of each critical spin that one trajectory has."""
-    spins = ((name, *found) for name in OVER_TIME for found in critical_spins(one, name))
+    spins = ((name, *found) for name in OVER_TIME for found in critical_spins(one.data_vars, name))
     return [(name, sign, float(at), source) for name, sign, at, source in spins if np.isfinite(at)]
 
 
@@ -111,10 +118,11 @@ def _explaining(dataset: xr.Dataset, *axes: Axis) -> Iterator[tuple[str, str, xr
     if "n0" not in dataset.coords or not set(dataset["n0"].dims) <= across & {"n0"}:
         return
     between = fine.critical_spins(dataset, *axes)
-    for name in ("n_c1", "n_c2"):
-        for sign, values, source in critical_spins(dataset, name):
-            if set(values.dims) <= across:
-                yield name, sign, between.get(str(values.name), values), source
+    known = {name: values for name, values in dataset.data_vars.items() if {*values.dims} <= {*across, "sign"}}
+    known |= {name: values for name, values in between.items() if name in known}
+    for name in _SOURCES:
+        for sign, values, source in critical_spins(known, name):
+            yield name, sign, values, source
 
 
 def best_shape(dataset: xr.Dataset) -> float | None:

@@ -43,10 +43,10 @@ def formulas() -> Section:
             against_paper("k4", "k4 ~ a² δ / 2", float(k.k4[0])),
             against_paper("best_f", "f of the largest form factor", best_f),
             against_paper("best_b", "b of the largest form factor at a = 10", best_b),
-            against_paper("n_c1_plus", "n_c1+ at μ = 75", plus),
-            against_paper("n_c1_minus", "n_c1- at μ = 75", minus),
-            against_paper("n_c2_plus", "n_c2+ at μ = 75", 2 * plus),
-            against_paper("n_c2_minus", "n_c2- at μ = 75", 2 * minus),
+            against_paper("n_c1_positive", "n_c1+ at μ = 75", plus),
+            against_paper("n_c1_negative", "n_c1- at μ = 75", minus),
+            against_paper("n_c2_positive", "n_c2+ at μ = 75", 2 * plus),
+            against_paper("n_c2_negative", "n_c2- at μ = 75", 2 * minus),
         ],
     )  # fmt: skip
 

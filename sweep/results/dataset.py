@@ -41,11 +41,10 @@ class Reason(IntEnum):
     NO_FRICTION = 1
     NO_COUPLING = 2
     NOT_FOUND = 3
-    # 4 was a simulated n_c1 that disagreed with the eigenvalues.
-    REVERSES_AT_N_C1 = 5
-    UNDECIDED = 6
-    FAILED = 7
-    IMPOSSIBLE = 8
+    REVERSES_AT_N_C1 = 4
+    NOT_SETTLED = 5
+    FAILED = 6
+    IMPOSSIBLE = 7
 
 
 REASONS = {int(reason): reason.name.lower() for reason in Reason}
@@ -59,15 +58,18 @@ def _flag(long_name: str, meanings: Mapping[int, str], description: str = "", **
     return Variable("int8", NUMBER, long_name, description, meanings, **how)
 
 
-def _critical(name: str, side: str, source: str, by: str) -> Variable:
-    where = "Positive spin above" if side == "plus" else "Negative spin below"
+def _critical(name: str, source: str, by: str, *along: str) -> Variable:
     event = "a tiny rattle grows" if name == "n_c1" else "the spin reverses"
-    title = f"{name}{SIDES[side]}, {source}"
-    return Variable("float64", SPIN, title, f"{where} which {event}, by {by}.", per_body=True)
+    words = f"Spin beyond which {event}, by {by}."
+    return Variable("float64", SPIN, f"{name}, {source}", words, per_body=True, along=("sign", *along))
 
 
-SIDES = {"plus": "⁺", "minus": "⁻"}
-"""The signs of a critical spin, as names of variables have them, and as figures print them."""
+FURTHER = {
+    "sign": ([1, -1], "sign of the spin"),
+    "end": (["inner", "outer"], "end of the bracket"),
+    "reversal": ([], "number of the reversal"),
+}
+"""Values and words of further dimensions of variables; a dimension without values is counted from one."""
 
 VARIABLES: dict[str, Variable] = {
     **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
@@ -89,27 +91,15 @@ VARIABLES: dict[str, Variable] = {
                                            "Time of the first spin reversal predicted by Garcia and Hubbard (1988); "
                                            "missing where nothing drives a reversal, where friction stops it, or where "
                                            "their formula does not cover the body."),
-    **{
-        f"{name}_{side}{suffix}": _critical(name, side, source, by)
-        for name, suffix, source, by in (
-            ("n_c1", "", "formula", "the formula of Takano (2011)"),
-            ("n_c2", "", "formula", "the formula of Takano (2011)"),
-            ("n_c1", "_linear", "eigenvalues", "the eigenvalues of the model"),
-            ("n_c2", "_simulated", "simulation", "simulation: the middle of the bracket"),
-            ("n_c2", "_simulated_inner", "simulation, inner", "simulation: the end of the bracket nearer zero"),
-            ("n_c2", "_simulated_outer", "simulation, outer", "simulation: the far end of the bracket"),
-        )
-        for side in SIDES
-    },
+    "n_c1": _critical("n_c1", "formula", "the formula of Takano (2011)"),
+    "n_c2": _critical("n_c2", "formula", "the formula of Takano (2011)"),
+    "n_c1_linear": _critical("n_c1", "eigenvalues", "the eigenvalues of the model"),
+    "n_c2_simulated": _critical("n_c2", "simulation", "simulation: the middle of the bracket"),
+    "n_c2_bracket": _critical("n_c2", "simulation: ends", "simulation: the ends of the bracket", "end"),
+    "n_c_reason": _flag("why a critical spin is missing", REASONS,
+                        "Whether n_c1_linear and n_c2_simulated exist, and if not, why.",
+                        per_body=True, along=("sign",)),
     "form_factor": Variable("float64", NUMBER, "form factor L(f)", "Form factor L(f) of Takano (2011).", per_body=True),
-    **{
-        f"{name}_{side}_reason": _flag(f"{name}{SIDES[side]}: outcome", REASONS,
-                                       f"Whether {source} give {name}_{side}, and if not, why.", per_body=True)
-        for name, source in (("n_c1", "eigenvalues"), ("n_c2", "simulations"))
-        for side in SIDES
-    },
-    "critical_reason": _flag("why a critical spin is missing", REASONS,
-                             "First of the four reasons other than `exists`.", per_body=True),
 }  # fmt: skip
 
 
@@ -131,7 +121,7 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     meaning = {"reversals": VARIABLES[config.tier.counts]}
     variables = {
         name: xr.Variable(
-            (*over.dims, *filter(None, [spec.along])),
+            (*over.dims, *spec.along),
             shaped(over, spec, arrays[name]),
             described(meaning.get(name, spec), config.units),
         )
@@ -139,9 +129,10 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     }
     coordinates = {name: xr.Variable((name,), values, config.described(name)) for name, values in grid.axes.items()}
     for name, variable in variables.items():
-        if along := VARIABLES[name].along:
-            words = {"long_name": f"number of the {along}"}
-            coordinates[along] = xr.Variable((along,), np.arange(1, variable.shape[-1] + 1), words)
+        for dim in VARIABLES[name].along:
+            values, words = FURTHER[dim]
+            counted = np.arange(1, variable.sizes[dim] + 1)
+            coordinates[dim] = xr.Variable((dim,), values or counted, {"long_name": words})
     for name, column in grid.table.items():
         coordinates[name] = xr.Variable((grid.row,), column, config.described(name))
     if grid.table:
@@ -167,8 +158,8 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
 
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
-    """Raise a `InputError` if a parameter has the name of a variable, or of one of these `series`."""
-    own = {*VARIABLES, *PROBABILITIES, *ROWS, *series}
+    """Raise a `InputError` if a parameter has the name of a variable or dimension, or of one of these `series`."""
+    own = {*VARIABLES, *PROBABILITIES, *ROWS, *FURTHER, *series}
     names = own & set(config.tier.parameters)
     if names:
         words = f"parameter {min(names)}: is reserved for a variable of the dataset; rename it"
@@ -184,7 +175,7 @@ def layout(grid: Grid, names: Iterable[str]) -> dict[str, tuple[Grid, Variable]]
 def shaped(over: Grid, spec: Variable, values: Array) -> Array:
     """Return `values` over the cells of `over`, with the dimensions and type of the variable."""
     values = np.asarray(values).astype(spec.dtype, copy=False)
-    return values.reshape(over.shape + (values.shape[-1:] if spec.along else ()))
+    return values.reshape(over.shape + values.shape[values.ndim - len(spec.along) :])
 
 
 def pieces(grid: Grid, tile: tuple[slice, ...], arrays: Mapping[str, Array]) -> Iterator[tuple[str, Any, Array]]:

@@ -10,7 +10,6 @@ import xarray as xr
 
 from sweep.faults import FileError, counted
 from sweep.parameters import PARAMETERS
-from sweep.results.dataset import SIDES
 from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
 from sweep.results.probabilities import PROBABILITIES
@@ -42,7 +41,7 @@ def _over(dims: tuple[str, ...], *names: str) -> dict[str, tuple[str, ...]]:
     return dict.fromkeys(names, dims)
 
 
-SPINS = {f"{n}_{side}": f"{n}_{side}_{by}" for n, by in (("n_c1", "linear"), ("n_c2", "simulated")) for side in SIDES}
+SPINS = {"n_c1": "n_c1_linear", "n_c2": "n_c2_simulated"}
 """The critical spins, each with the variable that holds the model's own value."""
 
 _ENDS = [f"{order}{end}" for order in ("first_order", "total_order") for end in ("", "_low", "_high")]
@@ -54,7 +53,7 @@ TRAJECTORY = Kind(
 )  # fmt: skip
 CRITICAL = Kind(
     "critical", "critical spins", explored=True,
-    needs=_over((), "critical_reason", *(f"{name}_reason" for name in SPINS), *SPINS.values()),
+    needs=_over((), "n_c_reason", *SPINS.values()) | _over(("sign",), "sign"),
 )  # fmt: skip
 BOUNDARIES = Kind(
     "boundaries", "boundaries",

@@ -13,7 +13,7 @@ from sweep.variables import Variable
 _END = "end of the 95 % interval of the probability, by Wilson's formula; it is wide enough for Sobol points."
 
 PROBABILITIES = {
-    name: Variable("float64", NUMBER, long_name, description, along="count")
+    name: Variable("float64", NUMBER, long_name, description, along=("count",))
     for name, long_name, description in (
         ("probability", "probability of at least this many reversals", ""),
         ("probability_low", "probability, lower end of its 95 % interval", f"Lower {_END}"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import product
 from textwrap import fill
 
 import numpy as np
@@ -11,7 +12,7 @@ import xarray as xr
 from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.results.dataset import REASONS, STATUSES, Reason
+from sweep.results.dataset import REASONS, STATUSES
 from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, INDICES, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
@@ -153,16 +154,17 @@ def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
 
 def _critical(dataset: xr.Dataset) -> Iterator[str]:
     """Report how many critical spins were found, and why others are missing."""
-    yield f"critical spins of {_count(dataset['critical_reason'], 'body', 'bodies')}"
+    yield f"critical spins of {_count(dataset['n_c_reason'].isel(sign=0), 'body', 'bodies')}"
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
-    for name, source in SPINS.items():
-        codes, spins = dataset[f"{name}_reason"].values, dataset[source].values
-        counts = {words: int((codes == code).sum()) for code, words in REASONS.items()}
-        counts["found"] = counts.pop(REASONS[Reason.EXISTS])
-        ends = ", ".join(f"{count} {words.replace('_', ' ')}" for words, count in counts.items() if count)
-        span = f"; {np.nanmin(spins):.4g} to {np.nanmax(spins):.4g}" if np.isfinite(spins).any() else ""
-        yield f"  {name}: {ends}{span}"
+    for (name, source), sign in product(SPINS.items(), dataset["sign"].values):
+        one = dataset.sel(sign=sign)
+        found = one[source].values[np.isfinite(one[source])]
+        codes = one["n_c_reason"].values[np.isnan(one[source])]
+        counts = {words.replace("_", " "): int((codes == code).sum()) for code, words in REASONS.items()}
+        ends = ", ".join(f"{count} {words}" for words, count in (counts | {"found": len(found)}).items() if count)
+        span = f"; {found.min():.4g} to {found.max():.4g}" if len(found) else ""
+        yield f"  {name}, {'positive' if sign > 0 else 'negative'} spin: {ends}{span}"
 
 
 def _count(variable: xr.DataArray, *noun: str) -> str:

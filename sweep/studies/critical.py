@@ -106,7 +106,7 @@ class Spin:
             self.left = self.left[len(answers) :]
             self.reason = self._outwards(answers)
         if self.root and self.root.unknown:
-            self.reason = Reason.FAILED if any(each.failed for each in answers) else Reason.UNDECIDED
+            self.reason = Reason.FAILED if any(each.failed for each in answers) else Reason.NOT_SETTLED
         elif self.root and self.root.ended:
             self.reason = Reason.EXISTS
 
@@ -120,7 +120,7 @@ class Spin:
                 return self._bracketed()
         if self.left:
             return None
-        return Reason.UNDECIDED if np.isnan(self.passed[-1].distance) else Reason.NOT_FOUND
+        return Reason.NOT_SETTLED if np.isnan(self.passed[-1].distance) else Reason.NOT_FOUND
 
     def _bracketed(self) -> int | None:
         """Make a bracket of the last two places."""
@@ -128,7 +128,7 @@ class Spin:
             return Reason.REVERSES_AT_N_C1
         low, high = self.passed[-2:]
         if np.isnan(low.distance):
-            return Reason.UNDECIDED
+            return Reason.NOT_SETTLED
         values = {each.place: each.distance for each in (low, high)}
         smooth = {each.place: each.distance for each in self.passed if each.measured}
         self.root = Root(low.place, high.place, -np.log1p(-self.width), values, smooth)
@@ -186,22 +186,17 @@ class CriticalSpins(Search):
 
     def dataset(self) -> xr.Dataset:
         """Return the critical spins by formulas, eigenvalues and simulation, with the cost of the search."""
-        second, inner, outer = self.first.copy(), *np.full((2, *self.first.shape), np.nan)
+        reasons, bracket = self.first.T.copy(), np.full((self.grid.size, 2, 2), np.nan)
         for spin in self.spins:
-            at = (int(spin.sign < 0), spin.body)
-            second[at] = spin.reason
+            at = (spin.body, int(spin.sign < 0))
+            reasons[at] = spin.reason
             if spin.reason == Reason.EXISTS and spin.root:
-                inner[at], outer[at] = (spin.sign * np.exp(end) for end in (spin.root.low, spin.root.high))
-            elif spin.reason in (Reason.UNDECIDED, Reason.REVERSES_AT_N_C1):
-                outer[at] = spin.sign * np.exp(spin.reverses) if np.isfinite(spin.reverses) else np.nan
+                bracket[at] = [spin.sign * np.exp(end) for end in (spin.root.low, spin.root.high)]
+            elif spin.reason in (Reason.NOT_SETTLED, Reason.REVERSES_AT_N_C1) and np.isfinite(spin.reverses):
+                bracket[(*at, 1)] = spin.sign * np.exp(spin.reverses)
         arrays: dict[str, Array] = dict(self.prediction.variables)
         arrays.pop("reversals_predicted", None)
-        for half, side in enumerate(("plus", "minus")):
-            arrays[f"n_c2_{side}_simulated"] = (inner[half] + outer[half]) / 2
-            arrays[f"n_c2_{side}_simulated_inner"], arrays[f"n_c2_{side}_simulated_outer"] = inner[half], outer[half]
-            arrays[f"n_c1_{side}_reason"], arrays[f"n_c2_{side}_reason"] = self.first[half], second[half]
-        four = np.concatenate([self.first, second])
-        arrays["critical_reason"] = four[(four != Reason.EXISTS).argmax(axis=0), np.arange(self.grid.size)]
+        arrays |= {"n_c2_simulated": bracket.mean(axis=-1), "n_c2_bracket": bracket, "n_c_reason": reasons}
         title = f"{self.config.name}: critical spins ({self.config.model} model)"
         return dataset.label(self.config, self.grid, arrays, {"title": title, **self.attributes()}).drop_vars("n0")
 
@@ -216,10 +211,10 @@ def _way(n_c1: float, limit: float) -> list[float]:
 def _reasons_of_n_c1(config: Config, columns: Columns, prediction: Prediction) -> Array:
     """Return why the eigenvalues give no n_c1, or that it exists, for n_c1+ and n_c1- of all bodies, shape (2,
     bodies)."""
-    by_formula, linear = prediction.variables.get("n_c1_plus"), prediction.n_c1
+    by_formula, linear = prediction.variables.get("n_c1"), prediction.n_c1
     unresisted = np.isnan(linear) | (columns["mu"] <= 0 if by_formula is not None else False)
     never = np.isinf(linear)
-    uncoupled = never & (np.isnan(by_formula) if by_formula is not None else False)
+    uncoupled = never & (np.isnan(by_formula.T) if by_formula is not None else False)
     impossible = np.broadcast_to(config.equations.impossible(columns), linear.shape)
     reasons = [Reason.IMPOSSIBLE, Reason.NO_FRICTION, Reason.NO_COUPLING, Reason.NOT_FOUND]
     return np.select([impossible, unresisted, uncoupled, never], reasons, Reason.EXISTS)

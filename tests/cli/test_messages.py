@@ -148,7 +148,7 @@ def test_an_axis_of_any_parameter_is_drawn(write: Write, tmp_path: Path) -> None
         result = invoke("run", write(ONE), "--output", tmp_path / axis[0], "--set", axis, "--set", "n0=[0.04,0.05]")
         assert result.exit_code == 0
         assert (tmp_path / axis[0] / "odd.png").exists()
-    for variable in ("n_c1_plus", "form_factor", "energy_error", "step_rule"):
+    for variable in ("n_c1", "form_factor", "energy_error", "step_rule"):
         assert invoke("plot", tmp_path / "b" / "odd.nc", "--var", variable).exit_code == 0
         assert (tmp_path / "b" / f"odd_{variable}.png").read_bytes().startswith(b"\x89PNG")
 

@@ -108,7 +108,7 @@ def test_settled_trajectories_stay_where_they_are_said_to() -> None:
     settled = (left.status == SETTLED).values
     rest, end = left.spin_rest.values, later.spin_final.values
     # Beyond n_c1 a rattle grows, and turns the spin back, before it decays.
-    n_c1 = xr.where(left.spin_final > 0, left.n_c1_plus_linear, left.n_c1_minus_linear)
+    n_c1 = left.n_c1_linear.sel(sign=np.sign(left.spin_final).astype(int))
     grows = (left.spin_final / n_c1 > 1).values
     assert min((settled & grows).sum(), (settled & ~grows).sum()) >= 2
     assert (np.abs(rest / end - 1) < np.where(grows, 4e-3, 1e-3))[settled].all()

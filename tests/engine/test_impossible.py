@@ -16,6 +16,7 @@ from sweep.engine import local
 from sweep.engine.estimate import estimate
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.plots.marks import BLANK, legend, marks
+from sweep.results.dataset import Reason
 from sweep.results.summary import accuracy, describe, failed_fraction
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -114,10 +115,10 @@ def test_an_estimate_of_cells_none_of_which_can_be() -> None:
 def test_critical_spins_of_the_others(write: Write) -> None:
     found = sweep.critical(write(TEXT.replace("[0.02, 0.05]", "0.05")), bracket=1e-2, b=[0.9, 3.0], offset=[0.0, 0.3])
     gone = np.array([[True, False], [False, False]])
-    reason = found["n_c1_plus_reason"].transpose("b", "offset").values
-    np.testing.assert_array_equal(reason == 8, gone)
-    np.testing.assert_array_equal(np.isnan(found["n_c1_plus_linear"].transpose("b", "offset")).values, gone)
-    assert (found["n_c1_plus_linear"].sel(b=3.0) > 0).all()
+    positive = found.sel(sign=1).transpose("b", "offset", ...)
+    np.testing.assert_array_equal(positive["n_c_reason"] == Reason.IMPOSSIBLE, gone)
+    np.testing.assert_array_equal(np.isnan(positive["n_c1_linear"]), gone)
+    assert (positive["n_c1_linear"].sel(b=3.0) > 0).all()
 
 
 def test_a_trajectory_of_such_a_body_is_refused(write: Write) -> None:
@@ -130,7 +131,7 @@ def test_no_number_is_made_up_for_a_body_that_cannot_be(write: Write, change: di
     """Its moments break the triangle inequality, or its matrix is not positive definite."""
     text = "body: {Ixx: 2, Iyy: 20, Izz: 21, Ixy: -0.3}\nfriction: {mu: 60}\nstart: {n0: 0.05}\n"
     config = load_config(write(text + "integrator: {t_end: 100, step: 0.02}\n"), change)
-    predicted = sweep.predict(config)["n_c1_plus_linear"].values
+    predicted = sweep.predict(config)["n_c1_linear"].sel(sign=1).values
     np.testing.assert_array_equal(np.isnan(predicted), [False, True])
     assert sweep.run(config)["status"].values.tolist() == [2, IMPOSSIBLE]
 

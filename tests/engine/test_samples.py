@@ -70,10 +70,8 @@ def test_samples_are_run_as_cases_beside_each_value_of_an_axis(write: Write) -> 
         here = found.sel(b=b)
         for name in ("reversals", "status", "spin_final", "t_stop"):
             np.testing.assert_array_equal(alone[name], here[name])
-        np.testing.assert_array_equal(
-            alone["n_c1_plus_linear"], here["n_c1_plus_linear"].broadcast_like(here["sample"])
-        )
-    assert found["n_c1_plus_linear"].dims == ("b",)
+        np.testing.assert_array_equal(alone["n_c1_linear"], np.tile(here["n_c1_linear"], (here.sizes["sample"], 1)))
+    assert found["n_c1_linear"].dims == ("b", "sign")
     assert found["n0"].attrs["distribution"] == "normal, mean 0.05, standard deviation 0.01"
 
 

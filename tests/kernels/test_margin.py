@@ -95,5 +95,6 @@ def test_what_has_settled_beyond_n_c1_reverses_no_more() -> None:
     asked |= {"integrator": {"method": "adams", "tolerance": 1e-7, "t_end": 10_000, "estimate_errors": False}}
     ended, _, which = settled(asked, 0.0)
     spins = ended.spin_final.values
-    beyond = which & (np.abs(spins) > np.abs(np.where(spins > 0, ended.n_c1_plus_linear, ended.n_c1_minus_linear)))
+    n_c1 = ended.n_c1_linear.sel(sign=xr.DataArray(np.where(spins > 0, 1, -1), dims="case")).values
+    beyond = which & (np.abs(spins) > np.abs(n_c1))
     assert beyond.sum() > 10

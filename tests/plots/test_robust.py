@@ -21,7 +21,7 @@ from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
 from sweep.plots.figure import opaque
 from sweep.results.dataset import REASONS, VARIABLES, described
-from sweep.results.kind import CRITICAL
+from sweep.results.kind import SPINS
 from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES, probabilities
 
@@ -43,13 +43,12 @@ def sampled(n0: tuple[float, ...] = (0.02, 0.05), status: int = SETTLED) -> xr.D
 
 
 def critical(spins: dict[str, list[float]], reason: list[int], dim: str = "case", **coords: Any) -> xr.Dataset:
-    """A dataset of critical spins, with these values of them along one axis, and the others unknown."""
-    unknown = dict.fromkeys(CRITICAL.needs, [np.nan] * len(reason))
-    reasons = {name: np.array(reason, "int8") for name in unknown if name.endswith("reason")}
-    found: dict[str, Any] = {**unknown, **reasons, **spins}
-    return xr.Dataset(
-        {n: (dim, np.array(v), described(VARIABLES[n])) for n, v in found.items()}, coords, {"sweep_kind": "critical"}
-    )
+    """A dataset of critical spins, with these values for positive spins along one axis, and the others unknown."""
+    found = dict.fromkeys(SPINS.values(), [np.nan] * len(reason)) | spins | {"n_c_reason": reason}
+    variables = {
+        n: ((dim, "sign"), np.array(v, VARIABLES[n].dtype)[:, None], described(VARIABLES[n])) for n, v in found.items()
+    }
+    return xr.Dataset(variables, {"sign": [1], **coords}, {"sweep_kind": "critical"})
 
 
 def words(figure: Figure) -> list[str]:
@@ -79,9 +78,9 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
         (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "the axis mu has no values; select at least one"),
         (lambda d: d.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
         (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
-        (lambda d: d[["n_c1_plus"]], "name the variable to draw; choose n_c1_plus"),
+        (lambda d: d[["n_c1"]], "name the variable to draw; choose n_c1"),
         (lambda d: d.assign(reversals=d["reversals"].astype(str)), "variable: the values of reversals are not numbers"),
-        (lambda d: d[["n_c1_plus"]].drop_vars("n_c1_plus").assign_attrs(sweep_kind="run"), "has no variable to draw"),
+        (lambda d: d[["n_c1"]].drop_vars("n_c1").assign_attrs(sweep_kind="run"), "has no variable to draw"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(damage: Callable[[xr.Dataset], xr.Dataset], said: str) -> None:
@@ -100,7 +99,7 @@ def test_an_axis_without_numbers_has_no_nearest_value() -> None:
     [
         (xr.Dataset(attrs={"sweep_kind": "boundaries"}), r"lacks the variable level and \d+ other things; it was cut"),
         (xr.Dataset({"mu": []}, attrs={"sweep_kind": "critical"}), "the axis mu has no values; select at least one"),
-        (xr.Dataset(attrs={"sweep_kind": "critical"}), "lacks the variable critical_reason and 8 other things"),
+        (xr.Dataset(attrs={"sweep_kind": "critical"}), "lacks the variable n_c_reason and 3 other things"),
         (xr.Dataset({"seen": 1.0}, attrs={"sweep_kind": "fit"}), r"lacks the variable value and \d+ other things"),
     ],
 )
@@ -157,7 +156,7 @@ def test_a_figure_of_failures_says_so(starts: tuple[float, ...]) -> None:
 
 def test_critical_spins_of_rows_of_a_table_that_share_a_body() -> None:
     found = sweep.predict({**FORMULAS, "cases": {"x0": [0.01, 0.02], "n0": [0.02, 0.03]}})
-    spins = {name: found[name].values.tolist() for name in ("n_c1_plus", "n_c1_plus_linear")}
+    spins = {name: found[name].sel(sign=1).values.tolist() for name in ("n_c1", "n_c1_linear")}
     coords: Any = {name: found[name] for name in ("a", "b", "c", "delta", "mu")}
     rows = critical(spins, [0, 0], **coords).assign_attrs(config=found.attrs["config"])
     (axes,) = picture.plot(rows).axes
@@ -167,25 +166,25 @@ def test_critical_spins_of_rows_of_a_table_that_share_a_body() -> None:
 
 def test_critical_spins_that_do_not_exist() -> None:
     no_coupling = {name: code for code, name in REASONS.items()}["no_coupling"]
-    figure = picture.plot(critical({"n_c1_plus": [np.nan, np.inf]}, [no_coupling] * 2))
+    figure = picture.plot(critical({"n_c1": [np.nan, np.inf]}, [no_coupling] * 2))
     assert words(figure) == ["no critical spin: no coupling (2)"]
     assert not entries(figure)
-    some = picture.plot(critical({"n_c1_plus": [0.1, 0.2], "n_c2_plus_simulated": [np.nan] * 2}, [no_coupling] * 2))
+    some = picture.plot(critical({"n_c1": [0.1, 0.2], "n_c2_simulated": [np.nan] * 2}, [no_coupling] * 2))
     assert len(entries(some)) == 2
     assert not [text for text in entries(some) if "simulation" in text or "c2" in text]
 
 
 def test_a_figure_names_the_panels_that_it_leaves_out() -> None:
-    bodies = critical({"n_c1_plus": [0.1] * 10}, [0] * 10).expand_dims(mu=np.arange(50.0, 62.0)).transpose("case", "mu")
+    bodies = critical({"n_c1": [0.1] * 10}, [0] * 10).expand_dims(mu=np.arange(50.0, 62.0)).transpose("case", "mu", ...)
     figure = picture.plot(bodies.isel(case=slice(9)))
     assert len(figure.axes) == 8
     assert entries(figure)[-1] == "the first 8 of 9 panels"
 
 
 def test_the_critical_spins_of_one_body_are_seen() -> None:
-    one = critical({"n_c1_plus": [0.1]}, [0]).isel(case=0)
+    one = critical({"n_c1": [0.1]}, [0]).isel(case=0)
     (axes,) = picture.plot(one).axes
-    (line,) = [line for line in axes.lines if line.get_gid() == "n_c1_plus"]
+    (line,) = [line for line in axes.lines if line.get_gid() == "n_c1"]
     assert np.ptp(line.get_xdata()) > 0
 
 

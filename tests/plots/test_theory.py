@@ -20,7 +20,6 @@ from sweep.models.ladder import analytic
 from sweep.models.theory import stability
 from sweep.plots import description, picture, places
 from sweep.plots.theory import Line, Points, crossings, lines
-from sweep.results.kind import CRITICAL
 
 BODY = {"a": 10.0, "c": 1.0, "delta": 0.03}
 
@@ -82,12 +81,10 @@ def test_the_code_of_a_users_model_does_not_run_for_a_picture() -> None:
 
 def test_curves_of_critical_spins_are_smooth_from_the_first_value_to_the_last() -> None:
     dataset = predictions([30.0, 80.0, 130.0, 180.0]).sel(b=4.5).drop_vars(["n0", "reversals_predicted"])
-    for name in set(CRITICAL.needs) - set(dataset):
-        dataset[name] = dataset["n_c1_plus"].astype("int8" if name.endswith("reason") else float)
-    dataset["n_c2_plus_simulated"] = dataset["n_c2_plus"]
+    dataset = dataset.assign(n_c_reason=dataset["n_c1"].astype("int8"), n_c2_simulated=dataset["n_c2"])
     (axes,) = picture.plot(dataset.assign_attrs(sweep_kind="critical")).axes
-    for name in ("n_c1_plus_linear", "n_c2_plus"):
-        (line,) = [each for each in axes.lines if each.get_gid() == name]
+    for name in ("n_c1_linear", "n_c2"):
+        line, _ = [each for each in axes.lines if each.get_gid() == name]
         mu = line.get_xdata()
         assert [len(mu) > 100, mu[0], mu[-1]] == [True, 30, 180]
         wanted = exact(Line(name[:4], "", []), b=np.full(len(mu), 4.5), mu=mu)

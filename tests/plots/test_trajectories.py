@@ -17,7 +17,6 @@ from sweep.results.dataset import VARIABLES
 from sweep.results.netcdf import open_dataset
 
 SERIES = ("contact_x", "contact_y", "v0_rate_1", "slip_rate_1", "energy", "dissipated")
-CRITICAL = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
 
 
 def made(mu: list[float], **given: Any) -> xr.Dataset:
@@ -26,12 +25,11 @@ def made(mu: list[float], **given: Any) -> xr.Dataset:
     series = np.outer(np.ones(len(mu)), np.cos(time / 10))
     bodies = np.asarray(mu, float)
     values = dict.fromkeys(("spin", *SERIES), (("trajectory", "time"), series))
-    of_bodies = dict(zip(CRITICAL, (1 / bodies, -1 / bodies, 2 / bodies, -2 / bodies), strict=True))
     constants = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "t_stop": 100.0} | given
     each = {name: ("trajectory", np.broadcast_to(v, len(mu))) for name, v in constants.items()}
-    each |= {name: ("trajectory", v) for name, v in {"mu": bodies, **of_bodies}.items()}
-    each["reversals"] = "trajectory", np.full(len(mu), 3)
-    dataset = xr.Dataset({**values, **each}, {"time": time}, {"sweep_kind": "trajectory"})
+    each |= {"mu": ("trajectory", bodies), "reversals": ("trajectory", np.full(len(mu), 3))}
+    each |= {name: (("trajectory", "sign"), np.outer(n / bodies, [1, -1])) for n, name in ((1, "n_c1"), (2, "n_c2"))}
+    dataset = xr.Dataset({**values, **each}, {"time": time, "sign": [1, -1]}, {"sweep_kind": "trajectory"})
     dataset["status"] = "trajectory", np.full(len(mu), SETTLED)
     dataset["time"].attrs = {"long_name": "time t", "units": "sqrt(c/g)"}
     dataset["spin"].attrs = {"long_name": "spin n", "units": "sqrt(g/c)"}
@@ -149,8 +147,8 @@ def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
     settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--bracket", "0.1")
     file, told = told_of("critical", write(), *settings)
     assert "critical spins of 2 bodies (mu 2)" in told
-    assert "n_c1_plus: 1 no friction, 1 found; 0.0024" in told
-    assert invoke("plot", file, "--var", "n_c2_plus_simulated").exit_code == 0
+    assert "n_c1, positive spin: 1 no friction, 1 found; 0.0024" in told
+    assert invoke("plot", file, "--var", "n_c2_simulated").exit_code == 0
     figure = picture.plot(file)
     assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 8
     assert not figure.axes[0].get_legend()

@@ -17,20 +17,22 @@ from sweep.results import provenance
 from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.writing import replacing
 
-NOT_BY_DEFAULT = """method t_first_reversal_predicted reversal_times reversals_foreseen foreseen_sure"""
+NOT_BY_DEFAULT = """method t_first_reversal_predicted reversal_times reversals_foreseen foreseen_sure n_c2_simulated
+n_c2_bracket n_c_reason"""
 
 
 def test_dataset_is_labelled(small: xr.Dataset) -> None:
-    assert dict(small.sizes) == {"mu": 2, "b": 3, "n0": 2}
+    assert dict(small.sizes) == {"mu": 2, "b": 3, "n0": 2, "sign": 2}
     assert small["reversals"].dims == ("mu", "b", "n0")
-    assert small["n_c1_plus"].dims == small["form_factor"].dims == ("mu", "b")
-    assert set(small.coords) == {"mu", "b", "n0", "a", "c", "delta", "x0", "y0"}
+    assert (small["n_c1"].dims, small["form_factor"].dims) == (("mu", "b", "sign"), ("mu", "b"))
+    assert small["sign"].values.tolist() == [1, -1]
+    assert (small["n_c1_linear"] * small["sign"] > 0).all()
+    assert set(small.coords) == {"mu", "b", "n0", "sign", "a", "c", "delta", "x0", "y0"}
     for name, variable in small.variables.items():
         assert "long_name" in variable.attrs, name
         assert variable.attrs.get("units") != "1", name  # or xarray's labels would end with "[1]"
     assert small["delta"].attrs["units"] == "radian"
-    of_runs = {n for n in VARIABLES if not n.endswith("_reason") and "simulated" not in n}
-    assert set(small.data_vars) == of_runs - {*NOT_BY_DEFAULT.split()}
+    assert set(small.data_vars) == {*VARIABLES} - {*NOT_BY_DEFAULT.split()}
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
         "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",
     }  # fmt: skip

@@ -23,11 +23,11 @@ from sweep.results.dataset import REASONS
 from sweep.results.summary import describe
 
 STANDARD = "name: standard\nfriction: {mu: 75}\nintegrator: {t_end: 12000}\n"
-NAMES = ("n_c1_plus", "n_c1_minus", "n_c2_plus", "n_c2_minus")
 
 
-def reasons(spins: xr.Dataset, name: str) -> list[str]:
-    return [REASONS[code] for code in np.atleast_1d(spins[f"{name}_reason"].values)]
+def reasons(spins: xr.Dataset) -> list[str]:
+    """The outcomes for positive and for negative spin of one body."""
+    return [REASONS[code] for code in spins["n_c_reason"].values]
 
 
 def simulated_growth(bodies: Columns, spin: Array) -> Array:
@@ -64,8 +64,7 @@ def test_a_simulated_rattle_grows_as_the_eigenvalues_say(number: int, write: Wri
     rest = {name: values for name, values in config.parameters.items() if name not in bodies}
     predicted = sweep.predict(replace(config, parameters=rest, cases={n: tuple(v) for n, v in bodies.items()}))
     at_rest = simulated_growth(bodies, np.zeros(number))
-    for name in ("n_c1_plus_linear", "n_c1_minus_linear"):
-        n_c1 = predicted[name].values
+    for n_c1 in predicted["n_c1_linear"].transpose("sign", ...).values:
         assert (simulated_growth(bodies, 0.998 * n_c1) < 0).all()
         assert (simulated_growth(bodies, 1.002 * n_c1) > 0).all()
         for share in (0, 0.5, 4):
@@ -77,19 +76,20 @@ def test_a_simulated_rattle_grows_as_the_eigenvalues_say(number: int, write: Wri
 @pytest.mark.parametrize(("parameters"), [{"mu": 160.0}, {"model": "averaged"}])
 def test_n_c2_lies_beyond_n_c1(parameters: dict[str, Any], write: Write) -> None:
     spins = sweep.critical(write(STANDARD), **parameters)
-    assert (reasons(spins, "n_c1_minus"), reasons(spins, "n_c2_minus")) == (["exists"], ["exists"])
-    assert spins.n_c2_minus_simulated_outer < spins.n_c2_minus_simulated_inner <= spins.n_c1_minus_linear < 0
+    assert reasons(spins)[1] == "exists"
+    inner, outer = spins.n_c2_bracket.sel(sign=-1).values
+    assert outer < inner <= spins.n_c1_linear.sel(sign=-1) < 0
 
 
 @pytest.mark.parametrize("mu", [60.0, 75.0])
 def test_brackets_are_as_narrow_as_asked_and_another_method_says_the_same(mu: float, write: Write) -> None:
     spins = sweep.critical(write(STANDARD), mu=mu, bracket=1e-6)
     assert "n0" not in spins.coords
-    assert spins.critical_reason == 0
-    for side in ("plus", "minus"):
-        ends = [float(spins[f"n_c2_{side}_simulated_{end}"]) for end in ("inner", "outer")]
+    assert reasons(spins) == ["exists", "exists"]
+    assert (np.abs(spins.n_c2_simulated / spins.n_c1_linear - 2) < 0.1).all()
+    for sign in (1, -1):
+        ends = spins.n_c2_bracket.sel(sign=sign, end=["inner", "outer"]).values.tolist()
         assert 0 < ends[1] / ends[0] - 1 < 1.01e-6
-        assert 1.9 < spins[f"n_c2_{side}_simulated"] / spins[f"n_c1_{side}_linear"] < 2.1
         run = sweep.run(write(STANDARD), mu=mu, n0=ends, tolerance=1e-11, method="dopri5")
         assert run.reversals.values.tolist() == [0, 1]
 
@@ -99,7 +99,7 @@ def test_n_c2_is_the_first_boundary_along_n0(write: Write) -> None:
     spins = sweep.critical(write(STANDARD), mu=[60.0, 75.0], bracket=1e-5)
     curves = sweep.boundaries(write(STANDARD), x="n0", mu=[60.0, 75.0], n0=[0.003, 0.0045, 0.006], bracket=1e-5)
     first = curves.where((curves.level == 1) & (curves.bracket == "n0"), drop=True).sortby("mu")
-    np.testing.assert_allclose(first.n0, spins.n_c2_plus_simulated, rtol=2e-5)
+    np.testing.assert_allclose(first.n0, spins.n_c2_simulated.sel(sign=1), rtol=2e-5)
 
 
 def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
@@ -111,41 +111,39 @@ def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
         ({"model": "averaged", "delta": 0.0}, "no_coupling"),
     ):
         spins = sweep.critical(write(STANDARD), **settings)
-        assert [reasons(spins, name) for name in NAMES] == [[reason]] * 4
-        assert np.isnan([spins.n_c2_plus_simulated, spins.n_c2_minus_simulated]).all()
-        assert f"n_c1_plus: 1 {reason.replace('_', ' ')}" in describe(spins)
-        meanings = spins.critical_reason.attrs["flag_meanings"].split()
-        assert dict(zip(spins.critical_reason.attrs["flag_values"], meanings, strict=True)) == REASONS
+        assert reasons(spins) == [reason] * 2
+        assert np.isnan([spins.n_c1_linear, spins.n_c2_simulated]).all()
+        assert f"n_c1, positive spin: 1 {reason.replace('_', ' ')}" in describe(spins)
+        meanings = spins.n_c_reason.attrs["flag_meanings"].split()
+        assert dict(zip(spins.n_c_reason.attrs["flag_values"], meanings, strict=True)) == REASONS
 
 
 def test_friction_alone_makes_a_rattle_grow_at_a_fast_spin(write: Write) -> None:
     """Without the angle δ nothing tells right from left, and nothing reverses, but upright spin is not stable."""
     spins = sweep.critical(write(STANDARD), delta=0.0, t_end=100.0, bracket=0.01)
-    assert float(spins.n_c1_plus_linear) == pytest.approx(0.0798, rel=0.01)
-    assert float(spins.n_c1_minus_linear) == pytest.approx(-0.0798, rel=0.01)
-    assert "exists" not in reasons(spins, "n_c2_plus")
+    assert spins.n_c1_linear.values == pytest.approx([0.0798, -0.0798], rel=0.01)
+    assert "exists" not in reasons(spins)
 
 
 @pytest.mark.parametrize(
     ("settings", "reason"),
-    [({"x0": 1.0, "y0": 1.0}, "reverses_at_n_c1"), ({"t_end": 30.0}, "undecided"), ({"step": 0.5}, "failed")],
+    [({"x0": 1.0, "y0": 1.0}, "reverses_at_n_c1"), ({"t_end": 30.0}, "not_settled"), ({"step": 0.5}, "failed")],
 )
 def test_n_c2_that_is_not_known_has_a_reason(settings: dict[str, float], reason: str, write: Write) -> None:
     """A large rattle turns a slow spin by itself; trajectories are too short; their steps are far too long."""
     spins = sweep.critical(write(STANDARD), **settings, bracket=0.01)
-    assert reasons(spins, "n_c1_plus") == ["exists"]
-    assert reasons(spins, "n_c2_plus") == [reason]
-    assert np.isnan(spins.n_c2_plus_simulated)
-    assert REASONS[int(spins.critical_reason)] == reason
+    assert np.isfinite(spins.n_c1_linear).all()
+    assert reasons(spins)[0] == reason
+    assert np.isnan(spins.n_c2_simulated.sel(sign=1))
 
 
-def test_where_n_c2_is_undecided_its_upper_bound_is_told(write: Write) -> None:
+def test_an_n_c2_that_is_not_found_in_time_has_an_upper_bound(write: Write) -> None:
     """With this t_end only trajectories from well above n_c2 have reversed in time, and the others have not settled."""
     short, long = (sweep.critical(write(STANDARD), t_end=t_end, bracket=0.01) for t_end in (2000.0, 12_000.0))
-    assert (reasons(short, "n_c2_plus"), reasons(long, "n_c2_plus")) == (["undecided"], ["exists"])
-    assert np.isnan(short.n_c2_plus_simulated)
-    assert np.isnan(short.n_c2_plus_simulated_inner)
-    assert short.n_c2_plus_simulated_outer > 1.1 * long.n_c2_plus_simulated_outer
+    assert (reasons(short)[0], reasons(long)[0]) == ("not_settled", "exists")
+    early, late = (each.sel(sign=1) for each in (short, long))
+    assert np.isnan([early.n_c2_simulated, early.n_c2_bracket.sel(end="inner")]).all()
+    assert early.n_c2_bracket.sel(end="outer") > 1.1 * late.n_c2_bracket.sel(end="outer")
 
 
 STONE = IN_SI | {
@@ -178,12 +176,9 @@ def test_a_small_body_reverses_as_a_large_one_does() -> None:
     start, more = {"n0": 1, "x0": 2.5e-6, "y0": 2.5e-6}, {"friction": {"mu": 2000}, "integrator": {"t_end": 5}}
     small = IN_SI | {"body": body, "start": start} | more
     large, found = (sweep.critical(scene, bracket=1e-2) for scene in (STONE, small))
-    assert not {"form_factor", "n_c1_plus"} & set(large)
-    for side in ("plus", "minus"):
-        assert large[f"n_c1_{side}_reason"] == 0
-        assert np.abs(large[f"n_c2_{side}_simulated"] / large[f"n_c1_{side}_linear"]) > 1  # t_end decides
-        assert large[f"n_c1_{side}_linear"].attrs["units"] == "radian s-1"
-        there, here = (each[f"n_c2_{side}_simulated"] for each in (large, found))
-        assert (found[f"n_c2_{side}_reason"] == large[f"n_c2_{side}_reason"]).all()
-        np.testing.assert_allclose(here, 20 * there, rtol=0.01)
-    assert np.abs(found["n_c2_minus_simulated"]).max() > 10
+    assert not {"form_factor", "n_c1"} & set(large)
+    assert (np.abs(large.n_c2_simulated / large.n_c1_linear) > 1).all()  # t_end decides
+    assert large.n_c1_linear.attrs["units"] == "radian s-1"
+    np.testing.assert_array_equal(found.n_c_reason, large.n_c_reason)
+    np.testing.assert_allclose(found.n_c2_simulated, 20 * large.n_c2_simulated, rtol=0.01)
+    assert np.abs(found.n_c2_simulated).max() > 10

@@ -35,23 +35,24 @@ def made(**axes: Any) -> xr.Dataset:
     count = np.broadcast_to((mu // 20)[:, None, None], shape)
     status = np.full(shape, SETTLED)
     status[2, 3, 0] = TIME_LIMIT
-    n_c1 = np.broadcast_to(1.0 / mu[:, None], shape[:2])
+    n_c1 = np.broadcast_to(1.0 / mu[:, None, None], (*shape[:2], 1)) * [1, -1]
     values = {
         "reversals": count,
         "reversals_predicted": count + 2,
         "status": status,
         "spin_final": np.broadcast_to(np.linspace(-0.1, 0.02, len(mu))[:, None, None], shape),
         "noise_limited": np.zeros(shape),
-        "n_c1_plus_linear": n_c1,
-        "n_c1_minus_linear": -n_c1,
-        "n_c1_plus": 3 * n_c1,
-        "n_c2_plus": 2 * n_c1,
-        "n_c2_minus": -2 * n_c1,
+        "n_c1_linear": n_c1,
+        "n_c1": 3 * n_c1,
+        "n_c2": 2 * n_c1,
     }
-    dims = ("mu", "b", "n0")
     variables = {
-        name: xr.Variable(dims[: v.ndim], v.astype(VARIABLES[name].dtype), described(VARIABLES[name]))
+        name: xr.Variable(
+            ("mu", "b", "sign" if VARIABLES[name].along else "n0"),
+            v.astype(VARIABLES[name].dtype),
+            described(VARIABLES[name]),
+        )
         for name, v in values.items()
     }
     constants = {"a": 10.0, "c": 1.0, "delta": 0.03}
-    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, **constants}, {"title": "made"})
+    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, "sign": [1, -1], **constants}, {"title": "made"})

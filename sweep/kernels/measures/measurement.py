@@ -42,7 +42,7 @@ from sweep.variables import Variable
 
 
 def measured(
-    dtype: str, units: Unit, long_name: str, description: str = "", *, flag: str = "", along: str | None = None
+    dtype: str, units: Unit, long_name: str, description: str = "", *, flag: str = "", along: tuple[str, ...] = ()
 ) -> Variable:
     """Describe a variable that a measurement adds to the dataset; it is undefined for a trajectory that failed.
 

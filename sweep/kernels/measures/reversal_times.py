@@ -27,7 +27,7 @@ class ReversalTimes(Measurement):
     summary = "times of the first K reversals: {reversal_times: K}, by default K = 10"
     asks = SPIN
     needs = ("reversals",)
-    variables = {"reversal_times": measured("float64", TIME, "time of each spin reversal", along="reversal")}
+    variables = {"reversal_times": measured("float64", TIME, "time of each spin reversal", along=("reversal",))}
     bounds = (1, 1000)
     count: int = 10
     """K, the number of reversals whose times are kept."""
