@@ -243,7 +243,7 @@ def test_the_finding_says_how_far_the_formula_is_off() -> None:
     said = re.search(r"(\d+) to (\d+) %", (ROOT / "docs/tutorial/finding.md").read_text(encoding="utf-8"))
     assert said
     line = sweep.predict(ROOT / "configs" / "mu.yaml")
-    ratios = line.n_c1_linear / line.n_c1
+    ratios = (line.n_c1_linear / line.n_c1).values
     assert [int(number) for number in said.groups()] == [round(100 * (1 - 1 / r)) for r in (ratios.min(), ratios.max())]
 
 
