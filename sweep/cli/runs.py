@@ -227,6 +227,7 @@ def fit(
     """
     from sweep.progress import Terminal
     from sweep.results.summary import describe
+    from sweep.results.writing import replacing
     from sweep.studies.laws import fitted
 
     names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
@@ -234,7 +235,8 @@ def fit(
     with Terminal(quiet) as terminal, of_option("--free", config.table):
         result = fitted(config, film, names, others, terminal, (time_column, spin_column))
     _save(result, files)
-    files.configuration.write_text(result.attrs["config"], encoding="utf-8")
+    with replacing(files.configuration) as temporary:
+        temporary.write_text(result.attrs["config"], encoding="utf-8")
     if not quiet:
         say(f"{describe(result)}\nwrote {files.dataset}, .png and .yaml")
 

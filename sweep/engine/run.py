@@ -59,7 +59,7 @@ def run(
         with connected(client) as there:
             return _compute(config, Store(), reporter, there).dataset()
     files = RunFiles(Path(output), config.name, config.picture)
-    with files.locked(), connected(client) as there:
+    with files.locked(reporter.note), connected(client) as there:
         if fresh:
             _forget_pictures(config, files)
             files.discard()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import xarray as xr
 from sweep.faults import FileError
 from sweep.results import netcdf
 from sweep.results.provenance import Identity
-from sweep.results.writing import remove_unfinished, replacing, require_writable
+from sweep.results.writing import NO_LOCKS, remove_unfinished, replacing, require_writable
 
 
 class RunFiles:
@@ -37,12 +37,16 @@ class RunFiles:
         """Raise a `FileError` if dataset or picture cannot be written."""
         for path in (self.dataset, self.picture):
             require_writable(path)
+        netcdf.require_usable(self.dataset)
+        if self.checkpoint.is_symlink():
+            raise FileError(f"{self.checkpoint}: a link, where a folder of this run belongs; remove it")
 
     @contextmanager
-    def locked(self) -> Iterator[None]:
+    def locked(self, note: Callable[[str], None]) -> Iterator[None]:
         """Keep other runs of this name out of the folder.
 
-        The operating system holds the lock and releases it when the process ends, for whatever reason.
+        The operating system holds the lock and releases it when the process ends, for whatever reason. Where the file
+        system has no locks, `note` is called with a line that says so.
 
         Raises
         ------
@@ -54,7 +58,7 @@ class RunFiles:
         path = self.folder / f".{self.name}.lock"
         while True:
             try:
-                handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+                handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
             except OSError as error:
                 raise FileError(f"{self.dataset}: cannot be locked: {error.strerror}") from None
             try:
@@ -63,6 +67,11 @@ class RunFiles:
                 os.close(handle)
                 words = "in use by another run; wait for it, or choose another --output"
                 raise FileError(f"{self.folder / self.name}: {words}") from None
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    os.close(handle)
+                    raise FileError(f"{self.dataset}: cannot be locked: {error.strerror}") from None
+                note(f"{self.folder}: its file system has no locks; do not start another run of this name there")
             with suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), path.stat()):
                     break
@@ -99,6 +108,7 @@ class RunFiles:
         """Keep the existing dataset while the run that enlarges it goes on."""
         self.checkpoint.mkdir(exist_ok=True)
         with replacing(self.earlier) as temporary:
+            temporary.unlink()
             try:
                 os.link(self.dataset, temporary)
             except OSError:  # the file system has no links

@@ -6,7 +6,10 @@ A file with its final name is complete.
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +22,22 @@ _PROBE = 1 << 22
 
 _BLOCK = 1 << 12
 """Number of bytes that fit unless the disk is full."""
+
+
+NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, 524}
+"""Errors of file systems without locks; Python has no name for 524, Linux's ENOTSUPP."""
+
+
+def lacks_locks(path: Path) -> bool:
+    """Return whether the file system of a file or a folder has no locks."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno in NO_LOCKS
+    finally:
+        os.close(handle)
+    return False
 
 
 def require_writable(path: Path) -> None:
@@ -47,8 +66,10 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     if path.is_dir() or not path.parent.is_dir():
         raise FileError(f"{path}: cannot be written: {'a folder' if path.is_dir() else f'no folder {path.parent}'}")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    # As `mkstemp` does, but with the usual permissions: nobody can foresee the name and put a link there.
+    temporary = path.with_name(f".{path.name}.{secrets.randbits(64)}.part")
     try:
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
         yield temporary
         _flush(temporary)
         os.replace(temporary, path)

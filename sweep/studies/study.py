@@ -172,7 +172,7 @@ class Task(NamedTuple):
             with connected(client) as there:
                 return search(Store(), there)
         files = RunFiles(Path(output), f"{config.name}_{verb}")
-        with files.locked(), connected(client) as there:
+        with files.locked(reporter.note), connected(client) as there:
             if fresh:
                 files.discard()
             if found := files.identity():

@@ -11,6 +11,7 @@ import xarray as xr
 from support import ROOT, Write
 from support.cli import invoke, refused
 from support.processes import python
+from support.runs import same_numbers
 
 import sweep
 from sweep.cli import environment
@@ -107,6 +108,75 @@ def test_a_disk_that_cannot_be_written_is_refused_at_once(
     refused(result, f"{output}", ": cannot be written: Read-only file system; choose another --output")
     assert "/." not in result.stderr.replace(str(tmp_path), "")
     assert not output.exists()
+
+
+def _without_locks(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    monkeypatch.setattr("fcntl.flock", Mock(side_effect=OSError(number, "No locks available")))
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, 524])
+def test_a_run_on_a_disk_without_locks_says_so_in_a_line(
+    number: int, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = sweep.run(write(TEXT))
+    _without_locks(monkeypatch, number)
+    result = invoke("run", write(TEXT), "--output", tmp_path / "out")
+    assert result.exit_code == 0
+    said = f"{tmp_path / 'out'}: its file system has no locks; do not start another run of this name there\n"
+    assert result.stderr.count(said) == 1
+    same_numbers(sweep.open_dataset(tmp_path / "out" / "quick.nc"), expected)
+    assert not (tmp_path / "out" / ".quick.lock").exists()
+
+
+LOCKS = "its file system has no locks, which HDF5 needs; set HDF5_USE_FILE_LOCKING=FALSE in the environment"
+
+
+@pytest.mark.usefixtures("_no_work")
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_disk_where_hdf5_needs_locks_is_refused_at_once(
+    verb: str, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the error that netCDF raises there."""
+    _without_locks(monkeypatch, errno.ENOLCK)
+    monkeypatch.setattr("netCDF4.Dataset", Mock(side_effect=PermissionError(errno.EACCES, "Permission denied")))
+    refused(invoke(*verb.split(), write(TEXT), "--output", tmp_path / "out"), f".nc: {LOCKS}")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_sound_file_on_a_disk_without_locks_is_not_called_damaged(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _without_locks(monkeypatch, errno.ENOLCK)
+    monkeypatch.setattr(xr, "open_dataset", Mock(side_effect=OSError(-101, "NetCDF: HDF error")))
+    refused(invoke("info", file), f"{file}: {LOCKS}")
+
+
+@pytest.mark.usefixtures("_no_work")
+def test_a_checkpoint_that_is_a_link_is_refused(write: Write, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "mine").mkdir()
+    for target in ("../mine", "nowhere"):
+        (tmp_path / "out" / "quick.checkpoint").symlink_to(target)
+        refused(invoke("run", write(TEXT), "--output", tmp_path / "out", "--fresh"), "quick.checkpoint: a link, where")
+        (tmp_path / "out" / "quick.checkpoint").unlink()
+    (tmp_path / "out" / ".quick.lock").symlink_to("../mine/lock")
+    refused(invoke("run", write(TEXT), "--output", tmp_path / "out"), "cannot be locked: Too many levels of symbolic")
+    assert list((tmp_path / "mine").iterdir()) == []
+
+
+def test_the_configuration_of_a_fit_is_written_whole_or_not_at_all(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In place of the one before, not into it."""
+    monkeypatch.setattr("sweep.studies.laws.fitted", lambda *_: xr.Dataset(attrs={"config": "new: 1\n"}))
+    monkeypatch.setattr("sweep.cli.runs._save", lambda *_: None)
+    (tmp_path / "film.csv").write_text("t,spin\n")
+    (tmp_path / "mine.yaml").write_text("old: 1\n")
+    (tmp_path / "quick_fit.yaml").symlink_to("mine.yaml")
+    words = ("fit", write(TEXT), tmp_path / "film.csv", "--free", "mu", "--output", tmp_path, "--quiet")
+    assert invoke(*words).exit_code == 0
+    assert (tmp_path / "quick_fit.yaml").read_text() == "new: 1\n"
+    assert (tmp_path / "mine.yaml").read_text() == "old: 1\n"
 
 
 @pytest.mark.usefixtures("_no_work")

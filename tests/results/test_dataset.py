@@ -1,7 +1,9 @@
 """What a dataset holds: labels, units, and all sources that decide its numbers; it is written whole or not at all."""
 
 import os
+import resource
 import shutil
+import signal
 import stat
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from support import ROOT, Write
 
 import sweep
 from sweep.faults import FileError
-from sweep.results import provenance
+from sweep.results import netcdf, provenance
 from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.writing import replacing
 
@@ -93,6 +95,51 @@ def test_no_temporary_file_survives_a_failure(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="cannot be written: full"):
         fill_the_disk()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_temporary_name_that_is_taken_by_a_link_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine").write_text("kept")
+    (tmp_path / ".x.nc.7.part").symlink_to("mine")
+    monkeypatch.setattr("secrets.randbits", lambda _: 7)
+    with pytest.raises(FileError, match="cannot be written: File exists"), replacing(tmp_path / "x.nc") as temporary:
+        temporary.write_text("whole")
+    assert (tmp_path / "mine").read_text() == "kept"
+
+
+def test_a_file_that_does_not_fit_leaves_no_data_behind(tmp_path: Path) -> None:
+    """HDF5 never closes it, so that its space is free only if it is empty."""
+    numbers = np.random.default_rng(0).random(100_000)
+    handles, limit = Path("/proc/self/fd"), resource.getrlimit(resource.RLIMIT_FSIZE)
+    usual = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, limit[1]))
+        with pytest.raises(FileError, match=r"x\.nc: cannot be written: File too large"):
+            netcdf.write(tmp_path / "x.nc", xr.Dataset({"a": ("x", numbers)}))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+        signal.signal(signal.SIGXFSZ, usual)
+    assert list(tmp_path.iterdir()) == []
+    removed = [each for each in handles.iterdir() if os.path.islink(each) and str(tmp_path) in os.readlink(each)]
+    assert [each.stat().st_size for each in removed] in ([], [0])
+
+
+@pytest.mark.parametrize("whole", [True, False], ids=["whole", "in pieces"])
+def test_a_changed_bit_is_noticed(whole: bool, tmp_path: Path) -> None:
+    """One that makes 257 reversals of one."""
+    counts, path = np.ones(70_000, "int16"), tmp_path / "x.nc"
+    dataset = xr.Dataset({"reversals": ("mu", counts)}, {"mu": np.arange(70_000)})
+    if whole:
+        netcdf.write(path, dataset)
+    else:
+        netcdf.write(path, dataset, {"reversals": (70_000,)}, [("reversals", slice(None), counts)])
+    assert (netcdf.open_dataset(path).reversals == 1).all()
+    data = bytearray(path.read_bytes())
+    data[data.index(counts[:1000].tobytes()) + 501] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(FileError, match=r"x\.nc: not a netCDF dataset, or damaged"):
+        netcdf.open_dataset(path)
 
 
 def test_what_the_makers_of_datasets_import_decides() -> None:
