@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Config", "Error", "FileError", "InputError", "animate", "boundaries", "changes", "critical", "explore", "fit",
-    "indices", "load_config", "open_dataset", "plot", "predict", "run", "trajectory",
+    "load_config", "open_dataset", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
 HOMES = {
@@ -69,7 +69,7 @@ def _refuse_arguments(config: Config) -> None:
 
     if not config.origin:
         return
-    verbs = run, boundaries, changes, critical, trajectory, fit, indices
+    verbs = run, boundaries, changes, critical, trajectory, fit
     arguments = {name for verb in verbs for name in signature(verb).parameters}
     if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
         message = f"parameter {wrong[0]!r} has the name of an argument of sweep.run or a similar function; rename it"
@@ -462,41 +462,6 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
 
     source = open_source(Path(dataset)) if isinstance(dataset, str | Path) else Source(require_whole(dataset))
     return serve_beside(source, usable(source), height)
-
-
-def indices(
-    config: ConfigLike,
-    output: str | Path | None = None,
-    *,
-    fresh: bool = False,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
-    client: Client | str | None = None,
-    **overrides: Any,
-) -> xr.Dataset:
-    """Compute Sobol sensitivity indices of the uncertain parameters.
-
-    Parameters
-    ----------
-    config, output, fresh, progress, reporter, client, overrides : as for `run`.  At least one parameter must be a
-        distribution, and none an axis. n (uncertain parameters + 2) trajectories are run, where n is the number of
-        samples rounded up to a power of two
-
-    Returns
-    -------
-    Dataset over (quantity, parameter): the index `first_order` of each parameter alone, and `total_order`, which
-    includes its interactions, both with the ends of their 95 % intervals. NaN if a sample failed, if some samples lack
-    the quantity, or if all samples agree.
-
-    Raises
-    ------
-    InputError, FileError
-        as `run`; also if the model is not simulated, no parameter is a distribution, or one is an axis.
-    """
-    from sweep.studies.indices import indices
-
-    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
-        return indices(checked).run(output, fresh=fresh, reporter=reporter, client=client)
 
 
 def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:

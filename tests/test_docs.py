@@ -166,9 +166,7 @@ def test_what_a_page_shows_runs(
             exec(compile(code, str(block), "exec"), names)
 
 
-_DRAWS = re.compile(
-    r"python -m sweep (run|plot|trajectory|animate|critical|boundaries|indices|fit|explore)\b(?!.*--dry)"
-)
+_DRAWS = re.compile(r"python -m sweep (run|plot|trajectory|animate|critical|boundaries|fit|explore)\b(?!.*--dry)")
 _OF_OTHER_THINGS = {"cluster", "develop", "reproduce", "resume"}
 """How-to pages whose commands draw, but which are about something else, or take minutes."""
 

@@ -22,7 +22,7 @@ FOREIGN = {
     "pydantic_core": {"config"},
     "rich": {"progress"},
     "ruamel": {"config"},
-    "scipy": {"config", "engine", "plots", "reproduce", "results", "studies"},
+    "scipy": {"config", "plots", "reproduce", "results", "studies"},
     "trimesh": {"config"},
     "xarray": {"api", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies"},
 }  # fmt: skip

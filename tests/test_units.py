@@ -11,7 +11,6 @@ from sweep.parameters import PARAMETERS, Parameter
 from sweep.results.dataset import VARIABLES
 from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES
-from sweep.studies import indices
 from sweep.studies.trajectory import SERIES
 from sweep.units import PAPER_UNITS, SI, WRITTEN, Unit, factor, named, pretty, quantity
 from sweep.variables import Variable
@@ -20,7 +19,7 @@ PINT: pint.UnitRegistry[float] = pint.UnitRegistry()
 UNITS = {name: unit for name, unit in vars(units).items() if isinstance(unit, Unit)}
 
 RECORDS: dict[str, Parameter | Variable] = {
-    **PARAMETERS, **VARIABLES, **PROBABILITIES, **POINTS, **indices.VARIABLES,
+    **PARAMETERS, **VARIABLES, **PROBABILITIES, **POINTS,
     **{name: Variable("float64", *each) for name, each in SERIES.items()},
 }  # fmt: skip
 

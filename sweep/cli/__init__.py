@@ -12,7 +12,7 @@ from sweep.cli.configurations import body, examples, parameters
 from sweep.cli.faults import Commands
 from sweep.cli.reports import bench, reproduce
 from sweep.cli.results import explore, info, plot
-from sweep.cli.runs import animate, boundaries, critical, fit, indices, run, trajectory
+from sweep.cli.runs import animate, boundaries, critical, fit, run, trajectory
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -30,7 +30,7 @@ def main() -> None:
 
 
 for _command in (
-    examples, parameters, body, run, trajectory, animate, boundaries, critical, indices, fit, reproduce, bench, plot,
+    examples, parameters, body, run, trajectory, animate, boundaries, critical, fit, reproduce, bench, plot,
     info, explore,
 ):  # fmt: skip
     main.add_command(_command)

@@ -1,4 +1,4 @@
-"""The commands that simulate: `run`, `trajectory`, `animate`, `boundaries`, `critical`, `indices` and `fit`."""
+"""The commands that simulate: `run`, `trajectory`, `animate`, `boundaries`, `critical` and `fit`."""
 
 from __future__ import annotations
 
@@ -185,21 +185,6 @@ def critical(config: Config, bracket: float, **how: Any) -> None:
     from sweep.studies.critical import critical as search
 
     _studied(search(config, bracket), **how)
-
-
-@click.command()
-@configured
-@_resumed
-def indices(config: Config, **how: Any) -> None:
-    """Compute Sobol sensitivity indices of the uncertain parameters.
-
-    CONFIG must describe a single body and start, with a distribution for each uncertain parameter. The indices give
-    each parameter's share of the variance of counts and times. Writes NAME_indices.nc and .png. An interrupted run
-    keeps finished simulations, and the same command resumes it.
-    """
-    from sweep.studies.indices import indices as find
-
-    _studied(find(config), **how)
 
 
 @click.command()

@@ -33,12 +33,8 @@ def unit(dataset: xr.Dataset, name: str) -> str:
 def words(dataset: xr.Dataset, name: str) -> str:
     """Return the words for a variable or coordinate, without its unit."""
     own = dataset[name].attrs.get("long_name") if name in dataset.variables else None
-    return str(own or short(name))
-
-
-def short(name: str) -> str:
-    """Return the standard words for a variable, or its name with spaces."""
-    return _RECORDS[name].long_name if name in _RECORDS else name.replace("_", " ")
+    usual = _RECORDS[name].long_name if name in _RECORDS else name.replace("_", " ")
+    return str(own or usual)
 
 
 def origin(dataset: xr.Dataset, name: str) -> str:

@@ -22,7 +22,6 @@ from sweep.plots import (
     critical,
     curves,
     fit,
-    indices,
     labels,
     maps,
     panels,
@@ -40,7 +39,6 @@ from sweep.results.kind import (
     CHANGES,
     CRITICAL,
     FIT,
-    INDICES,
     RUN,
     TRAJECTORY,
     Kind,
@@ -64,7 +62,6 @@ _OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
     CRITICAL: critical.draw,
     BOUNDARIES: boundaries.draw,
     FIT: fit.draw,
-    INDICES: indices.draw,
 }
 """Functions that draw the kinds of dataset other than maps and curves of a run."""
 

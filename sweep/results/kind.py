@@ -44,7 +44,6 @@ def _over(dims: tuple[str, ...], *names: str) -> dict[str, tuple[str, ...]]:
 SPINS = {"n_c1": "n_c1_linear", "n_c2": "n_c2_simulated"}
 """The critical spins, each with the variable that holds the model's own value."""
 
-_ENDS = [f"{order}{end}" for order in ("first_order", "total_order") for end in ("", "_low", "_high")]
 _FITTED = ("value", *(f"{end}_{share}" for share in (68, 95) for end in ("lower", "upper")))
 
 TRAJECTORY = Kind(
@@ -64,11 +63,6 @@ FIT = Kind(
     needs=_over(("parameter",), *_FITTED) | _over(("time",), "time", "seen", "fitted"),
     attributes=("title", "undetermined"),
 )  # fmt: skip
-INDICES = Kind(
-    "indices", "Sobol indices",
-    needs=_over(("quantity", "parameter"), *_ENDS) | {name: (name,) for name in ("quantity", "parameter")},
-    attributes=("title", "trajectories"),
-)  # fmt: skip
 CHANGES = Kind(
     "changes", "changes of a body",
     needs=_over(("parameter",), "parameter", "value", "change", "changed_at", "reversals"), attributes=("reversals",),
@@ -82,7 +76,7 @@ _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
 _CODES = ("status", "level", "curve", "outcome")
 """Variables that become meaningless once averaged."""
 
-_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, INDICES, CHANGES, RUN)}
+_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, CHANGES, RUN)}
 
 
 def kind(dataset: xr.Dataset) -> Kind | None:

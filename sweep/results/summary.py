@@ -13,7 +13,7 @@ from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import REASONS, STATUSES
-from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, INDICES, SPINS, TRAJECTORY, Kind, kind, parameters
+from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
 
@@ -100,19 +100,6 @@ def bound(one: xr.Dataset) -> str:
     """Describe the bound of a parameter whose 95 % interval reaches an end of the search; return "" for any other."""
     ends = f"below {one['upper_95'].item():.5g}", f"above {one['lower_95'].item():.5g}"
     return ("", *(f"{end} at 95 %; no interval" for end in ends), "not determined by the film")[int(one.get("edge", 0))]
-
-
-def _indices(dataset: xr.Dataset) -> Iterator[str]:
-    """Report the share of each parameter in the variance of each quantity."""
-    yield f"shares of the variance, by {dataset.attrs['trajectories']} trajectories: alone, and including interactions"
-    for quantity in dataset["quantity"].values:
-        for name in dataset["parameter"].values:
-            one = dataset.sel(quantity=quantity, parameter=name)
-            alone, total = (
-                _interval(*(one[f"{order}{end}"].item() for end in ("", "_low", "_high")))
-                for order in ("first_order", "total_order")
-            )
-            yield f"  {quantity:18} {name:8} {alone:22}   {total}".rstrip()
 
 
 def _changes(dataset: xr.Dataset) -> Iterator[str]:
@@ -249,6 +236,5 @@ _LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {
     CRITICAL: _critical,
     BOUNDARIES: _boundaries,
     FIT: _fit,
-    INDICES: _indices,
     CHANGES: _changes,
 }

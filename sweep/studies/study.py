@@ -19,7 +19,6 @@ from sweep.config import Config
 from sweep.config.document import is_number, plain_data
 from sweep.engine.cluster import connected
 from sweep.engine.errors import ROUND_OFF
-from sweep.engine.estimate import estimate
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
 from sweep.engine.whole import Whole
@@ -146,12 +145,11 @@ class Task(NamedTuple):
     """Its command, which names its files and its module in `sweep.studies`."""
     settings: str
     """Its own settings, as text."""
-    make: Callable[[Config, Store], Whole]
+    make: Callable[[Config, Store], Search]
 
     def estimate(self) -> str:
         """Describe the cost of the first round, and the rounds that follow, before anything is computed."""
-        study = self.make(self.config, Store())
-        return study.estimate() if isinstance(study, Search) else estimate(self.config)
+        return self.make(self.config, Store()).estimate()
 
     @deferred()
     def run(

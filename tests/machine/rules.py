@@ -61,7 +61,7 @@ CHANGES = st.tuples(draws.draws(draws.PHYSICAL, 5, 2), draws.draws(draws.OTHERWI
 )
 SCENES = several(st.tuples(NUMBER, CHANGES), 4)
 PICTURE = draws.draws(words.TAKEN["plot"], 4)
-STUDIES = ("boundaries", "critical", "indices")
+STUDIES = ("boundaries", "critical")
 NUMERALS = re.compile(r"-?\d+(\.\d*)?(e-?\d+)?")
 
 Asked = tuple[str, Draws]
