@@ -7,13 +7,13 @@ import logging
 import signal
 import socket
 import threading
+import traceback
 import webbrowser
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
+from pathlib import Path
 
-from bokeh.protocol.exceptions import ProtocolError
 from bokeh.server.server import Server
 
 from sweep.explorer import view
@@ -23,6 +23,7 @@ from sweep.explorer.slices import Source
 PORTS = range(5006, 5106)
 """Ports tried in turn if none is requested, so that links to a single explorer stay valid."""
 
+_PACKAGE = Path(__file__).parents[1]
 _SECONDS = 60.0
 """Longest wait for an explorer to start or to end."""
 
@@ -105,14 +106,17 @@ def _server(source: Source, setup: Setup | None, port: int | None) -> Server:
 
 
 def _quieten() -> None:
-    """Keep log messages of Bokeh and Tornado about closing pages and requested files off the terminal."""
-    for name in ("bokeh.server.views.ws", "tornado.access"):
+    """Keep messages of Bokeh and Tornado about closing pages and odd addresses off the terminal; our errors stay."""
+    for name in ("bokeh.server.views.ws", "tornado.access", "tornado.general"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    # The last words of a page that closes under load find no session, which Bokeh asserts; and an address may name an
-    # empty session.
-    for name, fault in (("bokeh.server.protocol_handler", AssertionError), ("tornado.application", ProtocolError)):
-        logging.getLogger(name).addFilter(partial(_is_other, fault))
+    # The last words of a page that closes under load find no session, which Bokeh asserts; and an address may name a
+    # session, a token or a file that cannot exist.
+    for name in ("bokeh.server.protocol_handler", "tornado.application"):
+        logging.getLogger(name).addFilter(_is_ours)
 
 
-def _is_other(fault: type[Exception], record: logging.LogRecord) -> bool:
-    return not (record.exc_info and isinstance(record.exc_info[1], fault))
+def _is_ours(record: logging.LogRecord) -> bool:
+    """Return whether a message is about an error in this package, or no error."""
+    frames = traceback.walk_tb(record.exc_info[2] if record.exc_info else None)
+    files = [Path(frame.f_code.co_filename) for frame, _ in frames]
+    return not files or any(file.is_relative_to(_PACKAGE) for file in files)

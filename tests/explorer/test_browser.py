@@ -718,9 +718,10 @@ def answer(place: str, path: str, headers: Mapping[str, str] | None = None) -> t
             return response.status, response.read().decode() if response.status == HTTPStatus.OK else ""
 
 
-def test_an_address_of_no_session_is_refused_without_a_word(served: str) -> None:
+@pytest.mark.parametrize("path", ["/?bokeh-session-id=%00", "/?bokeh-token=abc", "/static/%00"])
+def test_an_address_that_means_nothing_is_refused_without_a_word(served: str, path: str) -> None:
     """`served` asks in the end what was said on the terminal."""
-    status, _ = answer(urlsplit(served).netloc, "/?bokeh-session-id=%00")
+    status, _ = answer(urlsplit(served).netloc, path)
     assert status == HTTPStatus.INTERNAL_SERVER_ERROR
 
 
