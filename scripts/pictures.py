@@ -41,5 +41,6 @@ def explorer() -> None:
 
 if __name__ == "__main__":
     sweep.plot(sweep.run(CONFIGS / "mu_b.yaml", n0=0.05), output=STATIC / "map.png")
-    sweep.animate(CONFIGS / "mu.yaml", STATIC / "reversal.gif", mu=[60, 130, 200], t_end=220, begin=100, speed=30)
+    three = {"mu": [60, 130, 200]}
+    sweep.animate(CONFIGS / "mu.yaml", STATIC / "reversal.gif", at=three, t_end=220, begin=100, speed=30)
     explorer()

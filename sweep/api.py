@@ -13,7 +13,7 @@ from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
     from typing import Any
 
@@ -47,14 +47,14 @@ HOMES = {
 
 @contextmanager
 def _prepared(
-    config: ConfigLike, overrides: Mapping[str, Any], progress: bool | None, reporter: Reporter | None
+    config: ConfigLike, overrides: Mapping[str, Any], progress: bool | Callable[[float, str], None] | None
 ) -> Iterator[tuple[Config, Reporter]]:
     """Yield the checked configuration of a call, and the reporter of its progress."""
     from sweep.config import load_config
     from sweep.progress import reporting
 
     register()
-    with reporting(progress, reporter) as reporter:
+    with reporting(progress) as reporter:
         checked = load_config(config, overrides, announce=reporter.note)
         _refuse_arguments(checked)
         yield checked, reporter
@@ -81,8 +81,7 @@ def run(
     output: str | Path | None = None,
     *,
     fresh: bool = False,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
+    progress: bool | Callable[[float, str], None] | None = None,
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
@@ -97,8 +96,8 @@ def run(
     output : folder for the dataset and its maps; until they are finished it holds a checkpoint, from which the same
         call resumes. By default nothing is written
     fresh : discard the files of an earlier run in `output`
-    progress : whether to show a progress bar; by default only in notebooks
-    reporter : receives progress and messages instead of a bar
+    progress : whether to show a progress bar, by default only in notebooks; or a function that is called with the share
+        that is done, from 0 to 1, and a line of text
     client : a client of a dask cluster whose workers run the cells, or the address of its scheduler; by default the
         threads of this process run them
     overrides : values that replace those of `config`, such as ``mu=60``, ``t_end=1000`` or ``n0=np.linspace(0, 1, 9)``
@@ -121,7 +120,7 @@ def run(
     """
     from sweep.engine.run import run
 
-    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+    with _prepared(config, overrides, progress) as (checked, reporter):
         return run(checked, output, fresh=fresh, reporter=reporter, client=client)
 
 
@@ -134,8 +133,7 @@ def boundaries(
     bracket: float = BOUNDARY_WIDTH,
     deviation: float = BOUNDARY_DEVIATION,
     fresh: bool = False,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
+    progress: bool | Callable[[float, str], None] | None = None,
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
@@ -147,7 +145,7 @@ def boundaries(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, client, overrides : as for `run`
+    config, output, fresh, progress, client, overrides : as for `run`
     x, y : axes over which the curves are drawn; by default the second and the first with more than one value
     bracket : width of the brackets, relative to the value of the parameter along which each lies
     deviation : largest distance of the boundary, halfway between two points, from the smooth curve through them,
@@ -172,7 +170,7 @@ def boundaries(
     """
     from sweep.studies.boundaries import boundaries
 
-    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+    with _prepared(config, overrides, progress) as (checked, reporter):
         task = boundaries(checked, x, y, bracket, deviation)
         return task.run(output, fresh=fresh, reporter=reporter, client=client)
 
@@ -181,8 +179,7 @@ def changes(
     config: ConfigLike,
     *,
     reversals: int = 1,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
+    progress: bool | Callable[[float, str], None] | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Find the smallest change of each parameter that gives a body more reversals, or fewer.
@@ -194,7 +191,7 @@ def changes(
     ----------
     config : one body and one start, otherwise as for `run`; with viscous friction and without couples except `sigma`
     reversals : how many reversals more, at least; negative for fewer
-    progress, reporter, overrides : as for `run`
+    progress, overrides : as for `run`
 
     Returns
     -------
@@ -216,7 +213,7 @@ def changes(
     """
     from sweep.studies.changes import changes
 
-    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+    with _prepared(config, overrides, progress) as (checked, reporter):
         return changes(checked, reversals, reporter)
 
 
@@ -226,8 +223,7 @@ def critical(
     *,
     bracket: float = SPIN_WIDTH,
     fresh: bool = False,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
+    progress: bool | Callable[[float, str], None] | None = None,
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
@@ -239,7 +235,7 @@ def critical(
 
     Parameters
     ----------
-    config, output, fresh, progress, reporter, client, overrides : as for `run`
+    config, output, fresh, progress, client, overrides : as for `run`
     bracket : width of the brackets of n_c2, relative to the spin
 
     Returns
@@ -261,41 +257,40 @@ def critical(
     """
     from sweep.studies.critical import critical
 
-    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+    with _prepared(config, overrides, progress) as (checked, reporter):
         return critical(checked, bracket).run(output, fresh=fresh, reporter=reporter, client=client)
 
 
 def trajectory(
     config: ConfigLike,
     *,
+    at: Mapping[str, Any] | None = None,
     every: float | None = None,
     stop_early: bool = False,
     samples: int | None = None,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
-    **values: Any,
+    progress: bool | Callable[[float, str], None] | None = None,
+    **overrides: Any,
 ) -> xr.Dataset:
-    """Follow individual cells with dense output, up to t_end.
+    """Follow the cells of a sweep with dense output, up to t_end.
 
     The method is always dopri5, whatever the configuration names: it alone can stop after any step for a sample.
 
     Parameters
     ----------
-    config, progress, reporter : as for `run`
+    config, progress, overrides : as for `run`
+    at : the cells to follow, by parameter, such as ``{"mu": 60, "n0": [0.02, 0.05]}``; any values, also between those
+        of an axis. A parameter that is not given keeps its values. By default all cells, at most 1000
     every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
         per period of the fastest motion
     stop_early : end a trajectory once spin and count can no longer change, as a sweep does, instead of at t_end,
         whatever the configuration says; always so with `t_end: settled`
     samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
         samples of a run
-    values : the cells, by parameters such as ``mu=60, n0=[0.02, 0.05]``; each combination is one trajectory. An axis of
-        `config` that is not given takes its first value, with a warning if others are given. Anything else replaces a
-        value of `config`, such as ``t_end=300``
 
     Returns
     -------
-    Dataset over (trajectory, time): the series that the model supports, NaN after the end of a trajectory. Over
-    (trajectory): all results that a sweep gives for the cell, from the same steps, which the sampling does not change.
+    Dataset with the dimensions of a run of the same cells, and with the time: the series that the model supports, NaN
+    after the end of a trajectory. Also all results of a run, from the same steps, which the sampling does not change.
     The status is `settled` if spin and count could no longer change after t_stop.
 
     Raises
@@ -305,35 +300,26 @@ def trajectory(
 
     Examples
     --------
-    >>> two = sweep.trajectory({"friction": {"mu": 60}}, n0=[0.02, 0.05], t_end=100)
+    >>> two = sweep.trajectory({"friction": {"mu": 60}}, at={"n0": [0.02, 0.05]}, t_end=100)
     >>> two.spin.dims
-    ('trajectory', 'time')
+    ('n0', 'time')
     """
-    from warnings import warn
+    from sweep.studies.trajectory import trajectory
 
-    from sweep.config import parameters_of
-    from sweep.studies.trajectory import first_values, trajectory
-
-    known = parameters_of(config, values)
-    cells = {name: value for name, value in values.items() if name in known}
-    settings = {name: value for name, value in values.items() if name not in known}
-    with _prepared(config, settings, progress, reporter) as (checked, reporter):
-        found = trajectory(checked, every=every, stop_early=stop_early, samples=samples, reporter=reporter, **cells)
-    if cells and (message := first_values(checked, cells)):
-        warn(message, stacklevel=2)
-    return found
+    with _prepared(config, overrides, progress) as (checked, reporter):
+        return trajectory(checked, at=at, every=every, stop_early=stop_early, samples=samples, reporter=reporter)
 
 
 def animate(
     source: ConfigLike | xr.Dataset,
     output: str | Path | None = None,
     *,
+    at: Mapping[str, Any] | None = None,
     begin: float = 0.0,
     end: float | None = None,
     speed: float | None = None,
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
-    **values: Any,
+    progress: bool | Callable[[float, str], None] | None = None,
+    **overrides: Any,
 ) -> FuncAnimation:
     """Animate the motion of bodies, side by side on a common clock.
 
@@ -344,8 +330,8 @@ def animate(
     output : file to write; its suffix sets the format: gif, mp4 (needs ffmpeg) or html (a page that needs no network)
     begin, end : the interval of time shown; by default until twice the latest of the bodies' first reversals
     speed : time shown per second of the clip; by default such that the clip takes ten seconds
-    progress, reporter : as for `run`
-    values : the cells and other values of a configuration, as for `trajectory`; a dataset takes none
+    progress : as for `run`
+    at, overrides : the cells, and replaced values of a configuration, as for `trajectory`; a dataset takes none
 
     Returns
     -------
@@ -359,24 +345,25 @@ def animate(
     FileError
         if the file is not a dataset, or `output` cannot be written.
     """
-    from pathlib import Path
     from typing import cast
 
     from sweep.config import load_config
+    from sweep.faults import fault_of
     from sweep.plots import animation
 
-    if output is not None:
-        animation.check(Path(output))
+    animation.check(output, begin, end, speed)
     if animation.is_dataset(source):
         from sweep.progress import reporting
         from sweep.studies.filmed import shown
 
-        with reporting(progress, reporter) as reporter:
-            of_file = shown(source, reporter)
-        return animation.animate(of_file, output, begin=begin, end=end, speed=speed, **values)
-    config = cast("ConfigLike", source)
-    animation.require_attitude(load_config(config))
-    followed = trajectory(config, progress=progress, reporter=reporter, **values)
+        if given := [*(["at"] if at else []), *overrides]:
+            raise fault_of("cannot be used with a dataset; give the configuration instead", given[0])
+        with reporting(progress) as reporter:
+            followed = shown(source, reporter)
+    else:
+        config = cast("ConfigLike", source)
+        animation.require_attitude(load_config(config))
+        followed = trajectory(config, at=at, progress=progress, **overrides)
     return animation.animate(followed, output, begin=begin, end=end, speed=speed)
 
 
@@ -388,8 +375,7 @@ def fit(
     laws: Sequence[str] = (),
     time_column: str = "",
     spin_column: str = "",
-    progress: bool | None = None,
-    reporter: Reporter | None = None,
+    progress: bool | Callable[[float, str], None] | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
     """Find the body, friction and start that reproduce a film of one body.
@@ -398,7 +384,7 @@ def fit(
 
     Parameters
     ----------
-    config, progress, reporter, overrides : as for `run`. A free parameter with several values is sought between the
+    config, progress, overrides : as for `run`. A free parameter with several values is sought between the
         smallest and the largest. The range of a free parameter with a single value is found from the film and the body,
         and widened if the best value lies at its end. A parameter given as a distribution is also free, and the
         distribution counts as a measurement
@@ -427,7 +413,7 @@ def fit(
     """
     from sweep.studies.laws import fitted
 
-    with _prepared(config, overrides, progress, reporter) as (checked, reporter):
+    with _prepared(config, overrides, progress) as (checked, reporter):
         return fitted(checked, film, free, laws, reporter, (time_column, spin_column))
 
 
@@ -524,7 +510,7 @@ def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Datas
 
 
 class Accessor:
-    """Adds methods of this package to xarray datasets: `dataset.sweep.plot()`, `dataset.sweep.trajectory(mu=60)`."""
+    """Adds methods of this package to xarray datasets: `dataset.sweep.plot()`, `dataset.sweep.trajectory()`."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
@@ -541,12 +527,10 @@ class Accessor:
 
         return plot(self._dataset, variable, **options)
 
-    def trajectory(self, **values: Any) -> xr.Dataset:
-        """Follow cells of the dataset, or of what was selected of it, with dense output and its configuration.
+    def trajectory(self, **options: Any) -> xr.Dataset:
+        """Follow the cells of the dataset, or of what was selected of it, with dense output and its configuration.
 
-        Parameters
-        ----------
-        values : the cells, such as ``mu=60``, and the other arguments of `sweep.trajectory`
+        Arguments and result as for `sweep.trajectory`.
 
         Raises
         ------
@@ -559,7 +543,7 @@ class Accessor:
 
         if "config" not in self._dataset.attrs:
             raise fault_of("the dataset contains no configuration; call sweep.trajectory with one")
-        return trajectory(configuration(self._dataset), **values)
+        return trajectory(configuration(self._dataset), **options)
 
 
 @cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from importlib.util import find_spec
 
@@ -15,25 +15,41 @@ from rich.table import Column
 from sweep import interrupt
 from sweep.engine.reporter import Progress as Done
 from sweep.engine.reporter import Reporter
+from sweep.faults import fault_of, refusal
 from sweep.jit import showing
 
+ProgressLike = bool | Callable[[float, str], object]
+"""Whether to show a progress bar, or a function to call with the share that is done and a line of text."""
 
-def reporting(progress: bool | None, reporter: Reporter | None = None) -> AbstractContextManager[Reporter]:
-    """Choose the reporter of a call: `reporter` if it is given, otherwise a progress bar if one is wanted.
 
-    Parameters
-    ----------
-    progress : whether to show a bar; None for notebooks only
-    """
-    if reporter or not (in_notebook() if progress is None else progress):
-        return nullcontext(reporter or Reporter())
-    return Terminal()
+def reporting(progress: ProgressLike | None) -> AbstractContextManager[Reporter]:
+    """Choose the reporter of a call: a progress bar, a function or nothing; None for a bar in notebooks only."""
+    if callable(progress):
+        return nullcontext(Calls(progress))
+    if not isinstance(progress, bool | None):
+        raise fault_of(refusal(progress, "True, False or a function of a number and a text"), "progress")
+    return Terminal() if progress or (progress is None and in_notebook()) else nullcontext(Reporter())
 
 
 def in_notebook() -> bool:
     """Return whether this process is the kernel of a notebook."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
+
+
+class Calls(Reporter):
+    """Pass progress and messages to a function."""
+
+    def __init__(self, function: Callable[[float, str], object]) -> None:
+        self._function, self._share = function, 0.0
+
+    def chunk(self, progress: Done) -> None:
+        self._share = progress.done / progress.cells
+        failed = f", {progress.failed} failed" if progress.unit == "cells" else ""
+        self.note(f"{progress.done:.0f} of {progress.cells:.0f} {progress.unit} done{failed}")
+
+    def note(self, message: str) -> None:
+        self._function(self._share, message)
 
 
 _COMPILING = "compiling for this model and machine; later runs find it in the cache"

@@ -76,9 +76,11 @@ def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], ki
 
 def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
     with pytest.raises(InputError, match=r"^start point off the ellipsoid at x0=20"):
-        sweep.trajectory(SAID, x0=20)
-    with pytest.raises(InputError, match=r"^mu: is not a parameter of the noslip model; its parameters are a, b"):
-        sweep.trajectory({"model": "noslip"}, mu=60)
+        sweep.trajectory(SAID, at={"x0": 20})
+    with pytest.raises(InputError, match=r"^at\.mu\[1\]: must be a finite number"):
+        sweep.trajectory(SAID, at={"mu": [40, -1]})
+    with pytest.raises(InputError, match=r"^at\.mu: is not a parameter of the noslip model; its parameters are a, b"):
+        sweep.trajectory({"model": "noslip"}, at={"mu": 60})
 
 
 def test_overrides_of_a_config_act_as_on_its_file(write: Write) -> None:
@@ -184,14 +186,16 @@ def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
 
 def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     maps = sweep.run(SAID, tmp_path, mu=[40, 60, 80, 100, 120])
-    assert maps.sweep.plot("status", sel={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)
+    assert maps.sweep.plot("status", at={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)
     opened = sweep.open_dataset(tmp_path / "quick.nc")
-    xr.testing.assert_equal(opened.sweep.trajectory(mu=60, b=3), sweep.trajectory(SAID, mu=60, b=3))
+    xr.testing.assert_equal(opened.sweep.trajectory(at={"mu": 60, "b": 3}), sweep.trajectory(SAID, mu=60, b=3))
     assert repr(opened.sweep).startswith(
         "<sweep: quick: reversals of a rattleback (averaged model)>\n10 cells (mu 5 × b 2)"
     )
     assert {"plot", "trajectory"} <= {*dir(opened.sweep)}
-    xr.testing.assert_equal(opened.sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20))
+    xr.testing.assert_equal(
+        maps[{"mu": 0, "b": 0}].sweep.trajectory(t_end=20), sweep.trajectory(SAID, mu=40, b=2, t_end=20)
+    )
 
 
 @pytest.mark.parametrize(
@@ -204,21 +208,26 @@ def test_a_selected_cell_is_the_one_that_is_followed(several: dict[str, Any]) ->
     expected = sweep.trajectory({"model": "averaged", "friction": {"mu": 60}, "integrator": {"t_end": 20}}, b=3)
     for selected in (cells.isel(one), cells.isel(kept)):
         followed = selected.sweep.trajectory()
-        same_numbers(followed, expected)
-        same_numbers(followed.sweep.trajectory(), expected)
-        same_numbers(followed.isel(trajectory=0).sweep.trajectory(), expected)
+        assert followed.status.dims == selected.status.dims
+        np.testing.assert_array_equal(followed.spin.squeeze(), expected.spin)
+        same_numbers(followed.sweep.trajectory(), followed)
+    everything = cells.sweep.trajectory()
+    assert everything.spin.dims == (*cells.status.dims, "time")
+    np.testing.assert_array_equal(everything.isel(one).spin, expected.spin)
 
 
 @pytest.mark.parametrize("name", ["cells.csv", "a name with spaces so long that YAML folds it, onto one more line.csv"])
 def test_a_dataset_needs_no_other_file_for_its_trajectories(tmp_path: Path, name: str) -> None:
-    """The first of its cases stands in for the table."""
     (tmp_path / name).write_text("mu,n0\n60,0.05\n70,0.06\n", encoding="utf-8")
     config = tmp_path / "table.yaml"
     config.write_text(f"model: averaged\ncases: {name}\nintegrator: {{t_end: 20}}\n", encoding="utf-8")
     dataset = sweep.run(config)
     (tmp_path / name).unlink()
-    expected = sweep.trajectory({"model": "averaged", "friction": {"mu": 60}, "integrator": {"t_end": 20}}, n0=0.06)
-    xr.testing.assert_allclose(dataset.sweep.trajectory(n0=0.06), expected)
+    assert dataset.sweep.trajectory().spin.dims == ("case", "time")
+    at_both = dataset.sweep.trajectory(at={"n0": 0.06})
+    assert (at_both.mu.values.tolist(), float(at_both.n0)) == ([60, 70], 0.06)
+    one = {"model": "averaged", "friction": {"mu": 60}, "integrator": {"t_end": 20}}
+    np.testing.assert_allclose(at_both.spin[0], sweep.trajectory(one, n0=0.06).spin, rtol=1e-12)
 
 
 @pytest.mark.parametrize("text", ["configs/mu.yaml", "5", "[1]", "a: ["])

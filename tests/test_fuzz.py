@@ -94,4 +94,6 @@ def test_messages_contain_no_control_characters(write: Write, tmp_path: Path) ->
 
 def test_the_number_of_trajectories_is_limited(write: Write) -> None:
     pairs = [part for name in ("mu", "b", "n0") for i in range(1, 21) for part in ("--at", f"{name}={i}")]
-    assert "8000 trajectories are too many; ask for at most 1000" in refused(invoke("trajectory", write(), *pairs))
+    assert "--at: 8000 trajectories are too many; choose at most 1000 cells" in refused(
+        invoke("trajectory", write(), *pairs)
+    )

@@ -64,7 +64,7 @@ VERBS = {
         "runs/small/small_trajectory.nc", "runs/small/small_trajectory.png",
     ],
     "critical small.yaml --bracket 0.1": ["runs/small/small_critical.nc", "runs/small/small_critical.png"],
-    "plot runs/small/small.nc --var energy_error": ["runs/small/small_energy_error.png"],
+    "plot runs/small/small.nc --variable energy_error": ["runs/small/small_energy_error.png"],
     "info runs/small/small.nc": [],
     "body --mass 30g --length 12cm --width 3cm --height 15mm": [],
     "examples tippe_top": ["tippe_top.yaml", "tippe_top.py"],

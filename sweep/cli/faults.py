@@ -54,7 +54,11 @@ def _renamed(error: InputError, options: Mapping[Any, str]) -> InputError:
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)
-        return fault if fault.file or first not in options else replace(fault, path=(options[first], *rest))
+        if fault.file or first not in options:
+            return fault
+        if rest and isinstance(rest[0], str):  # of an option that takes NAME=VALUE
+            return replace(fault, path=(f"{options[first]} {rest[0]}", *rest[1:]))
+        return replace(fault, path=(options[first], *rest))
 
     return InputError(map(named, error.faults))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from sweep.cli.faults import refuse, say
-from sweep.faults import brief, suggestion
-from sweep.parameters import PARAMETERS, Parameter
+from sweep.faults import brief
+from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     from sweep.config import Config
@@ -33,12 +33,33 @@ def begun(_context: click.Context, parameter: click.Parameter, typed: str) -> li
     return [CompletionItem(f"{key}=", help=words) for key, words in known.items() if key.startswith(typed)]
 
 
+def _values(_context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Any]:
+    """Return the values of a repeatable option by name, such as 60, "12 cm" or a range; of a repeated name all."""
+    from sweep.config.document import parse_value
+
+    option, given = parameter.opts[0], dict[str, list[Any]]()
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value.strip()):
+            refuse(f"{option} {brief(text)}", "must be NAME=VALUE, such as mu=60 or a=12cm")
+        given.setdefault(name, []).append(parse_value(value, f"{option} {brief(name)}"))
+    return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
+
+
+def named_values(option: str, argument: str, words: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a repeatable option that takes NAME=VALUE, as a mapping."""
+    return click.option(
+        option, argument, multiple=True, metavar="NAME=VALUE", shell_complete=begun, callback=_values,
+        help=f"{words} (repeatable).",
+    )  # fmt: skip
+
+
 FILE = click.argument("file", type=PATH)
-SETTINGS = click.option(
-    "--set", "settings", multiple=True, metavar="PATH=VALUE", shell_complete=begun,
-    help="Replace a value of the configuration, e.g. friction.mu=60, or friction.mu=20..60:41 for the range "
-    "START..STOP:NUM (repeatable).",
+SETTINGS = named_values(
+    "--set", "settings",
+    "Replace a value of the configuration, e.g. t_end=1000, or mu=20..60:41 for the range START..STOP:NUM",
 )  # fmt: skip
+AT = named_values("--at", "at", "Choose the cells to follow, e.g. mu=60")
 OUTPUT = click.option("--output", type=PATH, help="Folder for the results [default: runs/NAME].")
 QUIET = click.option("--quiet", is_flag=True, help="Print only errors.")
 
@@ -52,54 +73,22 @@ def configured(command: Callable[..., None]) -> Callable[..., None]:
     """Add the argument CONFIG and the option `--set` to a command, which receives the loaded configuration."""
 
     @wraps(command)
-    def call(config: Path, settings: tuple[str, ...], **options: Any) -> None:
+    def call(config: Path, settings: dict[str, Any], **options: Any) -> None:
         command(config=loaded(config, settings), **options)
 
     return click.argument("config", type=PATH)(SETTINGS(call))
 
 
-def loaded(config: Path, settings: tuple[str, ...]) -> Config:
+def loaded(config: Path, settings: dict[str, Any]) -> Config:
     from sweep.config import load_config
-    from sweep.config.document import parse_value
 
     if not config.exists() and config.stem in examples():
         refuse(config, f"no such file; `sweep examples {config.stem}` copies the example of that name")
-    parsed = {}
-    for setting in settings:
-        path, equals, value = setting.partition("=")
-        if not (equals and path):
-            refuse(f"--set {brief(setting)}", "not a setting; write PATH=VALUE, such as friction.mu=60")
-        parsed[path] = parse_value(value, f"--set {brief(path)}")
-    return load_config(config, parsed, argument=lambda path: f"--set {path}", announce=announce)
+    return load_config(config, settings, argument=lambda path: f"--set {path}", announce=announce)
 
 
 announce = partial(say, err=True)
 """Print a note on stderr even with --quiet: user code never runs unannounced."""
-
-
-def cells_of(texts: tuple[str, ...], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """Return the values of `--at` by parameter, such as 60, "12 cm" or a range."""
-    from sweep.config.document import parse_value
-
-    given: dict[str, list[Any]] = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if name not in known:
-            meant = suggestion(name, known)
-            refuse(f"--at {brief(text)}", f"unknown parameter{meant}; the parameters are {', '.join(known)}")
-        if not (equals and value.strip()):
-            refuse(f"--at {brief(text)}", "must be NAME=VALUE, such as mu=60 or a=12cm")
-        given.setdefault(name, []).append(parse_value(value, f"--at {name}"))
-    return {name: values[0] if len(values) == 1 else values for name, values in given.items()}
-
-
-def parse_pair(text: str, option: str) -> tuple[str, float]:
-    from sweep.config.document import number
-
-    name, _, value = text.partition("=")
-    if (parsed := number(value)) is None:
-        refuse(f"{option} {brief(text)}", "must be NAME=NUMBER")
-    return name, parsed
 
 
 def parse_span(text: str, option: str) -> tuple[float, float]:

@@ -11,36 +11,29 @@ import click
 
 from sweep import interrupt
 from sweep.cli.faults import DONE, refuse, say
-from sweep.cli.options import FILE, PATH, announce, parse_pair, parse_span
-from sweep.faults import brief
+from sweep.cli.options import FILE, PATH, announce, named_values, parse_span
 from sweep.plots import formats
 
 
 @click.command()
 @FILE
-@click.option("--var", "variable", help="Variable to draw [default: the first picture named in the configuration, or "
+@click.option("--variable", help="Variable to draw [default: the first picture named in the configuration, or "
               "else the reversals, next to their prediction].")  # fmt: skip
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
-@click.option("--sel", "cells", multiple=True, metavar="NAME=VALUE",
-              help="Draw only the cells nearest to this value of a parameter, e.g. n0=0.05 (repeatable).")  # fmt: skip
+@named_values("--at", "at", "Draw only the cells nearest to this value of an axis, e.g. n0=0.05")
 @click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
 @click.option("--cmap", metavar="NAME", help="A matplotlib colour map, such as viridis.")
 @click.option("--width", metavar="LENGTH",
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
-@click.option("--no-title", is_flag=True, help="Leave out the title.")
+@click.option("--title", help='Title of the figure, "" for none [default: that of the dataset].')
 @click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.A_PICTURE} "
               "[default: a PNG beside FILE, named after FILE and the options].")  # fmt: skip
 def plot(
-    file: Path, variable: str | None, cells: tuple[str, ...], limits: str | None, no_title: bool, output: Path | None,
+    file: Path, variable: str | None, at: dict[str, Any], limits: str | None, title: str | None, output: Path | None,
     **how: Any,
 ) -> None:  # fmt: skip
     """Draw maps, curves, trajectories, critical spins or boundaries."""
-    sel = dict[str, float]()
-    for cell in cells:
-        name, value = parse_pair(cell, "--sel")
-        if sel.setdefault(name, value) != value:
-            refuse(f"--sel {brief(cell)}", f"{name} is given twice; draw one picture for each value")
     span = parse_span(limits, "--limits") if limits is not None else None
     from sweep.plots import panels, picture
     from sweep.results.kind import opened
@@ -48,13 +41,19 @@ def plot(
     interrupt.raise_again()
     # The picture drawn without options belongs to the run; any other gets its own name.
     asked = [f"{name}={value}" for name, value in {**how, "limits": limits}.items() if value]
-    parts = [file.stem, variable, *cells, *asked, "no-title" if no_title else ""]
+    parts = [
+        file.stem,
+        variable,
+        *(f"{name}={value}" for name, value in at.items()),
+        *asked,
+        "" if title is None else f"title={title}",
+    ]
     target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
     dataset = opened(file)
-    picture.plot(dataset, variable, sel=sel, limits=span, title=not no_title, output=target, **how)
-    for name, i in panels.nearest(dataset, sel).items():
+    picture.plot(dataset, variable, at=at, limits=span, title=title, output=target, **how)
+    for name, i in panels.nearest(dataset, at).items():
         taken = float(dataset[name][i])
-        say(f"{name} = {taken:g}" + (f", nearest to {sel[name]:g}" if taken != sel[name] else ""))
+        say(f"{name} = {taken:g}" + (f", nearest to {at[name]:g}" if taken != at[name] else ""))
     say(f"wrote {target}")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
-from sweep.cli.options import OUTPUT, PATH, QUIET, SETTINGS, begun, cells_of, configured, loaded
+from sweep.cli.options import AT, OUTPUT, PATH, QUIET, SETTINGS, configured, loaded
 from sweep.interrupt import INTERRUPTED
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, DEVIATIONS, SPIN_WIDTH, WIDTHS
 
@@ -23,22 +23,18 @@ if TYPE_CHECKING:
     from sweep.studies.study import Task
 
 
-SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
+CLIENT = click.option("--client", metavar="ADDRESS", help="Run on the workers of this dask scheduler.")
 
 
 DRY_RUN = click.option(
     "--dry-run", is_flag=True, help="Print how much would be simulated and roughly how long it would take, then stop."
 )
-AT = click.option(
-    "--at", "cells", multiple=True, metavar="NAME=VALUE", shell_complete=begun,
-    help="Parameter of the cell to follow, e.g. --at mu=60 --at b=3; several values give several cells.",
-)  # fmt: skip
 FRESH = click.option("--fresh", is_flag=True, help="Discard the files of an earlier run instead of resuming it.")
 
 
 def _resumed(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of commands that keep their simulations, resume, and can use several processes."""
-    for option in (QUIET, SCHEDULER, FRESH, DRY_RUN, OUTPUT):
+    for option in (QUIET, CLIENT, FRESH, DRY_RUN, OUTPUT):
         command = option(command)
     return command
 
@@ -70,6 +66,8 @@ def run(config: Config, **how: Any) -> None:
 @click.command()
 @configured
 @AT
+@click.option("--every", type=click.FloatRange(0, min_open=True),
+              help="Time between samples [default: nearly twenty per period of the fastest motion].")  # fmt: skip
 @click.option("--stop-early", is_flag=True,
               help="Stop once spin and count can no longer change, as a sweep does, instead of at t_end.")  # fmt: skip
 @click.option("--samples", type=click.IntRange(1), metavar="N",
@@ -78,21 +76,18 @@ def run(config: Config, **how: Any) -> None:
 @DRY_RUN
 @QUIET
 def trajectory(
-    config: Config, cells: tuple[str, ...], samples: int | None, output: Path | None, dry_run: bool, quiet: bool,
-    **how: Any,
-) -> None:  # fmt: skip
-    """Follow individual cells with dense output.
+    config: Config, at: dict[str, Any], samples: int | None, output: Path | None, dry_run: bool, quiet: bool, **how: Any
+) -> None:
+    """Follow the cells of CONFIG, or those of them that --at chooses, with dense output.
 
     They run to t_end of CONFIG. Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact
     point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for
     samples, only the spins are drawn.
     """
-    at = cells_of(cells, config.table)  # first, since the imports that follow take a second
-    if dry_run:
-        from sweep.studies.trajectory import estimate
+    from sweep.studies.trajectory import estimate
 
-        with of_option("--at", config.table):
-            click.echo(estimate(config, at, samples))
+    if dry_run:
+        click.echo(estimate(config, at, samples))
         return
     files = _files(config, "trajectory", output)
     _save(_followed(config, at, quiet, samples=samples, **how), files)
@@ -104,10 +99,9 @@ def trajectory(
 @click.argument("source", metavar="CONFIG|FILE", type=PATH)
 @SETTINGS
 @AT
-@click.option("--from", "begin", type=float, default=0.0, show_default=True, help="Time at which the clip begins.")
-@click.option("--to", "end", type=float, help="Time at which the clip ends [default: soon after the first reversal].")
-@click.option("--speed", type=click.FloatRange(0, min_open=True),
-              help="Time shown per second of the clip [default: such that the clip takes 10 s].")  # fmt: skip
+@click.option("--begin", type=float, default=0.0, show_default=True, help="Time at which the clip begins.")
+@click.option("--end", type=float, help="Time at which the clip ends [default: soon after the first reversal].")
+@click.option("--speed", type=float, help="Time shown per second of the clip [default: such that it takes 10 s].")
 @click.option(
     "--output",
     type=PATH,
@@ -115,9 +109,8 @@ def trajectory(
 )
 @QUIET
 def animate(
-    source: Path, settings: tuple[str, ...], cells: tuple[str, ...], begin: float, end: float | None,
-    speed: float | None, output: Path | None, quiet: bool,
-) -> None:  # fmt: skip
+    source: Path, settings: dict[str, Any], at: dict[str, Any], output: Path | None, quiet: bool, **how: Any
+) -> None:
     """Animate bodies and the paths of their contact points.
 
     CONFIG describes the bodies; FILE is a dataset written by `sweep trajectory` (NAME_trajectory.nc) or by `sweep fit`
@@ -128,16 +121,16 @@ def animate(
     from sweep.results.writing import require_writable
 
     of_file = animation.is_dataset(source)
-    if of_file and (settings or cells):
+    if of_file and (settings or at):
         refuse("--set" if settings else "--at", "cannot be used with a dataset; give the configuration instead")
     config = None if of_file else loaded(source, settings)
     usual = Path("runs") / config.name / f"{config.name}_trajectory.gif" if config else source.with_suffix(".gif")
     target = output or usual
-    animation.check(target)
+    animation.check(target, **how)
     require_writable(target)
     if config:
         animation.require_attitude(config)
-        result = _followed(config, cells_of(cells, config.table), quiet)
+        result = _followed(config, at, quiet)
     else:
         from sweep.progress import Terminal
         from sweep.studies.filmed import shown
@@ -145,7 +138,7 @@ def animate(
         with Terminal(quiet) as terminal:
             result = shown(source, terminal)
     target.parent.mkdir(parents=True, exist_ok=True)
-    animation.animate(result, target, begin=begin, end=end, speed=speed)
+    animation.animate(result, target, **how)
     if not quiet:
         say(f"wrote {target}")
 
@@ -227,14 +220,12 @@ def fit(
 
 
 def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr.Dataset:
-    """Follow the cells of `--at`, and report the value taken on each axis that it leaves out."""
+    """Follow the cells of `--at`."""
     from sweep.progress import Terminal
-    from sweep.studies.trajectory import first_values, trajectory
+    from sweep.studies.trajectory import trajectory
 
-    with Terminal(quiet) as terminal, of_option("--at", config.table):
-        if message := first_values(config, at):
-            terminal.note(message)
-        return trajectory(config, reporter=terminal, **how, **at)
+    with Terminal(quiet) as terminal:
+        return trajectory(config, at=at, reporter=terminal, **how)
 
 
 def _files(config: Config, verb: str, output: Path | None) -> RunFiles:
@@ -263,7 +254,7 @@ def _studied(task: Task, **how: Any) -> None:
 
 def _written(
     config: Config, verb: str, work: Callable[..., xr.Dataset], estimate: Callable[[], str], *,
-    fresh: bool, dry_run: bool, output: Path | None, scheduler: str | None, quiet: bool,
+    fresh: bool, dry_run: bool, output: Path | None, client: str | None, quiet: bool,
 ) -> xr.Dataset | None:  # fmt: skip
     """Carry out `work`, show its progress, and report result and files; in a dry run print only the estimate."""
     if dry_run:
@@ -276,7 +267,7 @@ def _written(
     before = _stamps(folder, name)
     with Terminal(quiet) as terminal:
         try:
-            result = work(output=folder, fresh=fresh, reporter=terminal, client=scheduler)
+            result = work(output=folder, fresh=fresh, reporter=terminal, client=client)
         except KeyboardInterrupt:
             done = f"{terminal.last.done:.0f} of {terminal.last.cells} cells" if terminal.last else "no cells"
             command = "the same command without --fresh" if fresh else "the same command"

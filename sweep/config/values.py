@@ -104,8 +104,8 @@ def _parse(parameter: Parameter, raw: Any) -> Values:
     return _axis([float(item) for item in raw])
 
 
-def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], str]) -> tuple[float, ...]:
-    """Return the numbers that `raw`, a number or an axis, gives to a parameter; a `InputError` names the parameter.
+def values_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], str], argument: str) -> Values:
+    """Return the number or the axis that an argument gives to a parameter; a `InputError` names both.
 
     `unitless`, such as `Config.unitless`, says why the parameter cannot have a unit.
     """
@@ -113,10 +113,13 @@ def numbers_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], st
         values = parse_values(parameter, plain_data(raw))
     except PydanticCustomError as error:
         context = error.context or {}
-        raise fault_of(context["reason"], parameter.name, *context["at"]) from None
-    if values.unit and (reason := unitless(parameter.name, values.unit)):
-        raise fault_of(reason, parameter.name)
-    return values.numbers
+        raise fault_of(context["reason"], argument, parameter.name, *context["at"]) from None
+    reason = unitless(parameter.name, values.unit) if values.unit else ""
+    if values.distribution:
+        reason = "cannot be a distribution; give a number, a list of numbers or a range"
+    if reason:
+        raise fault_of(reason, argument, parameter.name)
+    return values
 
 
 def in_si(units: Unit | str, raw: Any) -> tuple[Any, str]:

@@ -98,7 +98,7 @@ class Job(Reporter):
         """
         parameters = {name: Values.one(value) for name, value in self.cell.items()}
         usual, seconds = measures.default(setup.config.equations), 0.0
-        config = choose(replace(setup.config, parameters=parameters, measure=usual), {})
+        config = choose(replace(setup.config, parameters=parameters, measure=usual))
         columns, integrator = config.grid.columns(), config.integrator
         t_end = LONG if integrator.t_end >= FOREVER else integrator.t_end
         t_end = min(t_end, MAX_STEPS * float(steps_of(integrator.method, config, columns)[0].min()))
@@ -107,7 +107,7 @@ class Job(Reporter):
         for until in (share * t_end for share in _STRETCHES):
             began = time.perf_counter()
             shorter = integrator.model_copy(update={"t_end": until})
-            one = trajectory(replace(config, integrator=shorter), every=every, reporter=self).isel(trajectory=0)
+            one = trajectory(replace(config, integrator=shorter), every=every, reporter=self)
             lively, seconds = lively_until(one), seconds + time.perf_counter() - began
             still = one["status"] not in (RUNNING, TIME_LIMIT) and lively < one["time"][-1]
             whole = bool(until == t_end or still or one["status"] in FAILURES)

@@ -11,6 +11,7 @@ from sweep.config.document import text_of
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
 from sweep.faults import brief
+from sweep.grid import CASE
 from sweep.models.origin import Origin
 from sweep.results.configuration import configuration
 
@@ -33,7 +34,8 @@ class Setup:
 
     def __init__(self, source: Source, model: str | None = None, announce: Announce | None = None) -> None:
         # The dataset may come from anybody: a model file that it names runs only if the user names it.
-        config = configuration(source.dataset, *((_checked(source, model), announce) if model else ()))
+        first = source.dataset.isel({CASE: 0}, missing_dims="ignore")
+        config = configuration(first, *((_checked(source, model), announce) if model else ()))
         if not config.simulated:
             raise InputError([])
         medians = config.at_medians

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from math import inf, isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeGuard
@@ -16,11 +17,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sweep.config import Config
-from sweep.faults import fault_of
+from sweep.config.document import is_number, plain_data
+from sweep.faults import fault_of, refusal
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.figure import constants_in_lines, zero_line
 from sweep.plots.formats import suffix
+from sweep.results.dataset import TRAJECTORIES, along_one
 from sweep.results.writing import replacing
 
 MOST = 6
@@ -58,16 +61,15 @@ def animate(
 
     Parameters
     ----------
-    output : a file whose name `check` allows
+    output, begin, end, speed : as `check` allows them
     """
     path = None if output is None else Path(output)
-    if speed is not None and not 0 < speed < np.inf:
-        raise fault_of(f"{speed:g}; give a finite number above zero", "speed")
     if not body.drawable(shown):
         raise fault_of("has no attitude, or no a, b and c; animate trajectories of slip or noslip", "source")
-    if not shown.sizes.get("trajectory") or not shown.sizes.get("time"):
-        raise fault_of("has no axis trajectory or time with values; use the dataset that sweep wrote", "source")
-    if (bodies := shown.sizes["trajectory"]) > MOST:
+    shown = along_one(shown)
+    if not shown.sizes[TRAJECTORIES] or not shown.sizes["time"]:
+        raise fault_of("has an axis without values; select at least one", "source")
+    if (bodies := shown.sizes[TRAJECTORIES]) > MOST:
         raise fault_of(f"{bodies} bodies are too many for one clip; choose at most {MOST}", "source")
     first, last = map(float, shown["time"][[0, -1]])
     begin = max(begin, first)
@@ -101,8 +103,17 @@ def require_attitude(config: Config) -> None:
         raise config.error(("model",), f"the bodies of {config.model} have no attitude; animate slip or noslip")
 
 
-def check(path: Path) -> None:
-    """Raise a `InputError` if no animation can be written to a file of this name."""
+def check(output: str | Path | None, begin: float, end: float | None, speed: float | None) -> None:
+    """Raise a `InputError` if there is no such interval or speed, or no animation in a file of this name."""
+    if not (is_number(plain_data(begin)) and isfinite(begin)):
+        raise fault_of(refusal(begin, "a finite number"), "begin")
+    if end is not None and not (is_number(plain_data(end)) and begin < end < inf):
+        raise fault_of(refusal(end, f"a finite number above begin, {begin:g}"), "end")
+    if speed is not None and not (is_number(plain_data(speed)) and 0 < speed < inf):
+        raise fault_of(refusal(speed, "a finite number > 0"), "speed")
+    if output is None:
+        return
+    path = Path(output)
     if suffix(path) not in FORMATS:
         raise fault_of(f"{path}: unknown format; write a gif, mp4 or html", "output")
     if suffix(path) == "mp4" and not FFMpegWriter.isAvailable():
@@ -119,7 +130,7 @@ class _Scene:
     """The figure, and the state of each body at each frame."""
 
     def __init__(self, dataset: xr.Dataset, times: Array) -> None:
-        bodies = dataset.sizes["trajectory"]
+        bodies = dataset.sizes[TRAJECTORIES]
         self.figure = Figure((max(3.2 * bodies, 6.4), 4.8), dpi=80)
         constants = labels.constants(trajectories.constants_apart(dataset))
         self.figure.suptitle(constants_in_lines(constants, self.figure.get_figwidth()), y=0.99, fontsize=8)

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.config.document import is_number, plain_data
-from sweep.faults import fault_of
+from sweep.faults import fault_of, refusal
 from sweep.plots import labels
 from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture, subject
 from sweep.results.kind import odd_axis
@@ -60,7 +60,7 @@ def choose(
     *,
     x: str | None = None,
     y: str | None = None,
-    sel: Mapping[str, float] | None = None,
+    at: Mapping[str, float] | None = None,
     alone: bool = False,
 ) -> Panels:
     """Choose what to draw of a dataset; other parameters as of `sweep.plots.picture.plot`.
@@ -74,7 +74,7 @@ def choose(
     InputError
         if there is no such variable or axis, or there would be too many panels.
     """
-    dataset = dataset.isel(nearest(dataset, sel or {}))
+    dataset = dataset.isel(nearest(dataset, at or {}))
     names, compared = _variables(dataset, variable, alone=alone)
     first = field(dataset, names[0])
     if first.dtype.kind not in "fiub":
@@ -105,8 +105,8 @@ def choose(
     return Panels(dataset, whole, names, compared, across, indices(dataset, rest))
 
 
-def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
-    """Return the index along each axis of `sel` of the value that is nearest to the requested one.
+def nearest(dataset: xr.Dataset, at: Mapping[str, float]) -> dict[str, int]:
+    """Return the index along each axis of `at` of the value that is nearest to the requested one.
 
     Raises
     ------
@@ -114,22 +114,22 @@ def nearest(dataset: xr.Dataset, sel: Mapping[str, float]) -> dict[str, int]:
         if there is no such axis, or no such value on it.
     """
     found = {}
-    for name, wanted in sel.items():
+    for name, wanted in at.items():
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
-            raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "sel")
+            raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "at")
         check(dataset, [name], name)
-        at = plain_data(wanted)
-        if not (is_number(at) and math.isfinite(at)):
-            raise fault_of(f"{name} = {wanted}; give a finite number", "sel")
+        value = plain_data(wanted)
+        if not (is_number(value) and math.isfinite(value)):
+            raise fault_of(refusal(wanted, "one finite number"), "at", name)
         values = dataset[name].values
         low, high = values.min(), values.max()
         # Half a cell beyond the ends, like the cells of a map.
         beyond = (high - low) / (len(values) - 1) / 2 if len(values) > 1 else abs(low) / 2
-        if not low - beyond <= at <= high + beyond:
+        if not low - beyond <= value <= high + beyond:
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-            raise fault_of(f"{name} = {at:g} is far from all its values, {span}; choose one of them", "sel")
-        found[name] = int(np.abs(values - at).argmin())
+            raise fault_of(f"{value:g} is far from all its values, {span}; choose one of them", "at", name)
+        found[name] = int(np.abs(values - value).argmin())
     return found
 
 

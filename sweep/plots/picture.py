@@ -72,12 +72,12 @@ def plot(
     *,
     x: str | None = None,
     y: str | None = None,
-    sel: Mapping[str, float] | None = None,
+    at: Mapping[str, float] | None = None,
     limits: Limits | None = None,
     cmap: str | None = None,
     width: str | None = None,
     figsize: tuple[float, float] | None = None,
-    title: bool = True,
+    title: str | None = None,
     ax: Axes | None = None,
     output: str | Path | None = None,
 ) -> Figure:
@@ -92,14 +92,14 @@ def plot(
         there is one
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
-    sel : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
+    at : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
     limits : lowest and highest value of the scale
     cmap : name of a colour map of matplotlib
     width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, except subscripts,
         and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
         that was changed
     figsize : width and height in inches, by default as high as the panels need; not together with `width`
-    title : whether the figure has a title
+    title : of the figure, "" for none; by default that of the dataset
     ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
     output : file to write; its suffix names the format: png, pdf, svg or eps
 
@@ -135,14 +135,16 @@ def plot(
     for option, size in (("width", width), ("figsize", figsize)):
         if ax is not None and size is not None:
             raise fault_of("the given axes have their own size; leave it out", option)
-    if sel is not None and not isinstance(sel, Mapping):
-        raise fault_of(refusal(sel, "values by axis, such as {'n0': 0.05}"), "sel")
+    if at is not None and not isinstance(at, Mapping):
+        raise fault_of(refusal(at, "values by axis, such as {'n0': 0.05}"), "at")
+    if title is not None and not isinstance(title, str):
+        raise fault_of(refusal(title, "a text, or '' for none"), "title")
     if cmap is not None:
         scales.colour_map(cmap)  # raises if there is none
     if variable is None and isinstance(dataset, xr.DataArray):
         variable = str(dataset.name)
     opened = _opened(dataset)
-    axes, how = {"x": x, "y": y, "sel": sel}, {"limits": limits, "cmap": cmap}
+    axes, how = {"x": x, "y": y, "at": at}, {"limits": limits, "cmap": cmap}
     if ax is not None:
         _draw_in(ax, opened, variable, axes, how)
         figure = cast(Figure, ax.get_figure(root=True))
@@ -151,7 +153,7 @@ def plot(
             partial(_drawn, opened, variable, axes, how),
             figsize,
             inches(width) if width is not None else None,
-            title=title,
+            title,
         )
     if output is not None:
         save(figure, Path(output))
@@ -188,7 +190,7 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
 
 
 def _of_size(
-    draw: Callable[[], Picture], size: tuple[float, float] | None, across: float | None, *, title: bool
+    draw: Callable[[], Picture], size: tuple[float, float] | None, across: float | None, title: str | None
 ) -> Picture:
     """Draw a figure of a given size, or of a given width for print, in inches.
 
@@ -207,8 +209,8 @@ def _of_size(
                 figure.letter()
             if size:
                 figure.set_size_inches(scale * size[0], scale * size[1])
-            if not title:
-                figure.suptitle("")
+            if title is not None:
+                figure.suptitle(title)
             return figure, not is_asked() or figure.has_room(taller=size is None)
 
     figure, room = of(1.0)

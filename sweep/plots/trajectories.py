@@ -18,6 +18,7 @@ from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
 from sweep.plots.figure import Picture, is_column, panel_width, zero_line
+from sweep.results.dataset import TRAJECTORIES, along_one
 from sweep.results.kind import is_of_own_body, parameters
 
 # Titles, and the series drawn together; panels are in pairs.
@@ -64,6 +65,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
     InputError
         if there is no such series.
     """
+    dataset = along_one(dataset)
     series = [str(name) for name, v in dataset.data_vars.items() if "time" in v.dims]
     if variable is not None and variable not in series:
         raise fault_of(f"there is no series {variable}; choose {', '.join(series)}", "variable")
@@ -96,6 +98,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
 
 def draw_spin(axes: Axes, dataset: xr.Dataset, critical: bool = True) -> None:
     """n(t) of each trajectory with its reversals as dots, and the critical spins of each body as lines."""
+    dataset = along_one(dataset)
     axes.legend(handles=_spin(axes, dataset, critical), fontsize="x-small")
     axes.set_xlabel(labels.label(dataset, "time"))
 
@@ -117,7 +120,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
     axes.set_ylabel(labels.with_unit(names[first] if len(names) == 1 else "", labels.unit(dataset, first)))
     entries: list[Artist] = []
     # Oscillations are so dense that an opaque curve would hide those below it.
-    alone = dataset.sizes["trajectory"] == 1 or "spin" in names
+    alone = dataset.sizes[TRAJECTORIES] == 1 or "spin" in names
     shades = _SHADES if len(names) > 1 else (1.0 if alone else 0.7,)
     for i, one in enumerate(each(dataset)):
         for shade, name in zip(shades, names, strict=True):
@@ -125,7 +128,7 @@ def _series(axes: Axes, dataset: xr.Dataset, names: dict[str, str]) -> list[Arti
             line.set(label=label(dataset, i), gid=name, rasterized=one.sizes[one[name].dims[0]] > 5000)
         if i < _MOST_ENTRIES:
             entries.append(Line2D([], [], color=f"C{i}", label=label(dataset, i)))
-    if (more := dataset.sizes["trajectory"] - _MOST_ENTRIES) > 0:
+    if (more := dataset.sizes[TRAJECTORIES] - _MOST_ENTRIES) > 0:
         entries.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
     if len(names) > 1:
         named = zip(shades, names.values(), strict=True)
@@ -165,9 +168,9 @@ def lively_until(dataset: xr.Dataset) -> float:
 
 
 def each(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The trajectories of a dataset, or the dataset itself if it is a single one."""
-    count = dataset.sizes.get("trajectory")
-    return [dataset] if count is None else [dataset.isel(trajectory=i) for i in range(count)]
+    """Return the trajectories of a dataset."""
+    listed = along_one(dataset)
+    return [listed.isel({TRAJECTORIES: i}) for i in range(listed.sizes[TRAJECTORIES])]
 
 
 def _last_event(one: xr.Dataset) -> float:
@@ -204,8 +207,8 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 def label(dataset: xr.Dataset, i: int) -> str:
     """Its name, or the parameters that distinguish this trajectory from the others, and its number of reversals."""
-    if "trajectory" in dataset.coords and dataset["trajectory"].dtype.kind in "UO":
-        return str(dataset["trajectory"].values[i])
+    if TRAJECTORIES in dataset.coords:  # named, such as the film and its fit
+        return str(dataset[TRAJECTORIES].values[i])
     names = _varying(dataset) or [name for name in ("n0", "omega3") if name in dataset]
     named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
     return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named

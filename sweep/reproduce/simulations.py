@@ -47,13 +47,13 @@ def _figure(width: float, height: float, rows: int = 1, columns: int = 1, **shar
 
 def slip_ratio() -> Section:
     """Check figs. v01vp1m100 … v02vp2m200: the acceleration of the slip is small compared with that of v_0."""
-    both = trajectory(configure(t_end=400.0), mu=[100, 200])
+    both = trajectory(configure(t_end=400.0), at={"mu": [100, 200]})
     section = Section("Is dv_p/dt small compared with dv_0/dt?")
     for i, mu in enumerate((100, 200)):
         figure, pair = _figure(8, 3, columns=2)
         for axes, component in zip(pair, (1, 2), strict=True):
             # Starting without slip makes it jump once; the figures show the amplitudes after the jump.
-            late = both.isel(trajectory=i, time=both["time"].values > 1.0)
+            late = both.isel(mu=i, time=both["time"].values > 1.0)
             v0, vp = late[f"v0_rate_{component}"], late[f"slip_rate_{component}"]
             ratio = float(np.sqrt((vp**2).mean() / (v0**2).mean()))
             what = f"amplitude (rms) of v̇_p{component} over v̇_0{component}, μ = {mu}"
@@ -71,10 +71,10 @@ def critical_spins() -> Section:
     section = Section("Spins below, between and above the critical ones, μ = 75")
     figure, pair = _figure(8, 6.5, rows=2)
     for axes, starts in zip(pair, ((0.0015, 0.003, 0.005), (-0.006, -0.015, -0.025)), strict=True):
-        three = trajectory(configure(t_end=8000.0), mu=75, n0=starts, every=2.0)
+        three = trajectory(configure(t_end=8000.0), at={"mu": 75, "n0": starts}, every=2.0)
         draw_spin(axes, three)
         for i, (n0, grows, reverses) in enumerate(zip(starts, (False, True, True), (False, False, True), strict=True)):
-            one = three.isel(trajectory=i)
+            one = three.isel(n0=i)
             rattle = one["energy"] - 0.5 * 21.8 * one["spin"] ** 2
             early, peak = float(rattle[:40].mean()), float(rattle[40:].max())
             found = (peak > 3 * early, int(one["reversals"]) > 0)
@@ -92,16 +92,16 @@ def friction() -> Section:
     """Check fig. mu601000: counts at three frictions, and the approach to rolling."""
     section = Section("From three reversals to rolling")
     figure, (top, bottom) = _figure(8, 6.5, rows=2)
-    three = trajectory(configure(), mu=[60, 130, 200], every=3.0)
+    three = trajectory(configure(), at={"mu": [60, 130, 200]}, every=3.0)
     draw_spin(top, three.sel(time=slice(0, 6000)), critical=False)
     for i, mu in enumerate((60, 130, 200)):
         section.rows.append(against_paper(f"reversals_{mu}", f"reversals at μ = {mu}", int(three["reversals"][i])))
-    rough = trajectory(configure(t_end=1500.0), mu=[500, 1000, 1500], every=0.25)
+    rough = trajectory(configure(t_end=1500.0), at={"mu": [500, 1000, 1500]}, every=0.25)
     rolling = trajectory(configure("noslip", t_end=1500.0), every=0.25)
     draw_spin(bottom, rough, critical=False)
-    bottom.plot(rolling["time"], rolling["spin"][0], "k--", linewidth=0.8, label="no slip")
+    bottom.plot(rolling["time"], rolling["spin"], "k--", linewidth=0.8, label="no slip")
     bottom.legend(fontsize=7)
-    distance = [_distance(rough.isel(trajectory=i), rolling.isel(trajectory=0), 400.0) for i in range(3)]
+    distance = [_distance(rough.isel(mu=i), rolling, 400.0) for i in range(3)]
     closer = distance[0] > distance[1] > distance[2]
     found = ", ".join(f"{d:.2g}" for d in distance)
     what = "largest difference from no-slip, t < 400, μ = 500, 1000, 1500"

@@ -19,8 +19,6 @@ def configuration(
 ) -> Config:
     """Return the configuration of a dataset, or of the part of it that was selected.
 
-    A table of cases, or of trajectories, is replaced by its first one.
-
     Parameters
     ----------
     model : the file of a user-defined model, if it is to run
@@ -45,12 +43,12 @@ def configuration(
 def _selected(dataset: xr.Dataset, stored: Mapping[str, Any], *, of_table: bool) -> dict[str, Any]:
     """Return the values that the dataset has of parameters that vary in the stored configuration."""
     given = {name: value for each in stored.values() if isinstance(each, dict) for name, value in each.items()}
-    cells, found = kind(dataset) in (RUN, TRAJECTORY), dict[str, Any]()
+    cells, found, table = kind(dataset) in (RUN, TRAJECTORY), dict[str, Any](), dict[str, list[float]]()
     for name in parameters(dataset):
         column = dataset[name]
         varies = isinstance(given[name], list | dict) if name in given else of_table
-        if column.dims in ((CASE,), (TRAJECTORY.name,)):
-            found[name] = float(column[0])
+        if column.dims == (CASE,):
+            table[name] = column.values.tolist()
         elif cells and varies and column.dims in ((), (name,)) and "distribution" not in column.attrs:
             found[name] = column.values.tolist()
-    return found
+    return found | ({"cases": table} if table else {})

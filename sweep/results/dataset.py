@@ -157,6 +157,19 @@ def with_probabilities(config: Config, dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign_coords(count=coordinate).assign(added)
 
 
+TRAJECTORIES = "trajectory"
+"""Name of the dimension along which `along_one` lists trajectories."""
+
+
+def along_one(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset of trajectories, whatever their dimensions, with all of them along the first dimension."""
+    cells = [str(dim) for dim in dataset["spin"].dims if dim != "time"]
+    if not cells:
+        return dataset.expand_dims(TRAJECTORIES)
+    found = dataset if cells == [TRAJECTORIES] else dataset.stack({TRAJECTORIES: cells}, create_index=False)
+    return found.transpose(TRAJECTORIES, ...)
+
+
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `InputError` if a parameter has the name of a variable or dimension, or of one of these `series`."""
     own = {*VARIABLES, *PROBABILITIES, *ROWS, *FURTHER, *series}

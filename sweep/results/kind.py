@@ -48,7 +48,7 @@ _FITTED = ("value", *(f"{end}_{share}" for share in (68, 95) for end in ("lower"
 
 TRAJECTORY = Kind(
     "trajectory", "single trajectories",
-    needs=_over(("trajectory",), "status", "t_stop") | _over(("time",), "time") | {"spin": ("trajectory", "time")},
+    needs=_over((), "status") | _over(("time",), "time", "spin"),
 )  # fmt: skip
 CRITICAL = Kind(
     "critical", "critical spins", explored=True,
@@ -137,8 +137,10 @@ def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:
     needs = {**found.needs}
     if found == BOUNDARIES:
         needs |= _over((), *(dataset.attrs[name] for name in ("x", "y") if name in dataset.attrs))
-    if found == TRAJECTORY and not is_of_own_body(dataset):
-        needs |= _over((), "a", "b", "c")
+    if found == TRAJECTORY:
+        cells = dataset["status"].dims if "status" in dataset else ()
+        needs |= _over(cells, "t_stop") | _over((*cells, "time"), "spin")  # type: ignore[arg-type]
+        needs |= _over((), "a", "b", "c") if not is_of_own_body(dataset) else {}
     return needs | _over((), *PROBABILITIES, "count") if found == RUN and "probability" in dataset else needs
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.results.dataset import REASONS, STATUSES
+from sweep.results.dataset import REASONS, STATUSES, TRAJECTORIES, along_one
 from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, OPEN, UNCERTAIN
 from sweep.results.probabilities import PROBABILITIES
@@ -127,16 +127,18 @@ def _laws(dataset: xr.Dataset) -> Iterator[str]:
 def _trajectories(dataset: xr.Dataset) -> Iterator[str]:
     """Report how each trajectory ended, and its reversals, one per line."""
     most = 20
-    yield f"{counted(dataset.sizes['trajectory'], 'trajectory', 'trajectories')}, sampled in time"
-    for i in range(min(dataset.sizes["trajectory"], most)):
-        one = dataset.isel(trajectory=i)
+    dataset = along_one(dataset)
+    number = dataset.sizes[TRAJECTORIES]
+    yield f"{counted(number, 'trajectory', 'trajectories')}, sampled in time"
+    for i in range(min(number, most)):
+        one = dataset.isel({TRAJECTORIES: i})
         where = ", ".join(f"{name} = {float(one[name]):g}" for name in parameters(one))
         count = f", {counted(int(one['reversals']), 'reversal')}" if "reversals" in one else ""
         samples = int(np.isfinite(one["spin"]).sum())
         end = f"{STATUSES[int(one['status'])]} at t = {float(one['t_stop']):.6g}"
         yield f"  {where}: {end}{count}, {counted(samples, 'sample')}"
-    if dataset.sizes["trajectory"] > most:
-        yield f"  and {dataset.sizes['trajectory'] - most} more"
+    if number > most:
+        yield f"  and {number - most} more"
 
 
 def _critical(dataset: xr.Dataset) -> Iterator[str]:

@@ -16,7 +16,7 @@ from sweep.config import Config, ConfigLike, load_config
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.document import is_number, plain_data
 from sweep.config.schema import FOREVER
-from sweep.config.values import numbers_of
+from sweep.config.values import Values, values_of
 from sweep.engine import ending, executor
 from sweep.engine.cells import Cells
 from sweep.engine.errors import results
@@ -25,7 +25,7 @@ from sweep.engine.life import begin, live
 from sweep.engine.plan import plan, steps_of
 from sweep.engine.reporter import Count, Reporter
 from sweep.faults import duration, fault_of, refusal, suggestion
-from sweep.grid import SAMPLE, Array, Grid
+from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
 from sweep.kernels import path
 from sweep.kernels.build import PATH
@@ -103,13 +103,13 @@ _VECTORS = (("contact_x", "contact_y"), ("slip_1", "slip_2"))
 def trajectory(
     config: ConfigLike,
     *,
+    at: Mapping[str, Any] | None = None,
     every: float | None = None,
     stop_early: bool = False,
     samples: int | None = None,
     reporter: Reporter | None = None,
-    **at: Any,
 ) -> xr.Dataset:
-    """Follow cells of `config` selected by their parameters, such as ``mu=60, n0=[0.02, 0.05]``.
+    """Follow cells of `config`, as `sweep.trajectory`.
 
     The method is always dopri5, whatever the configuration names.  A sample is a state between two steps, but adams can
     continue only from the end of a block of steps, and leaps over stretches of small rattle.
@@ -117,21 +117,14 @@ def trajectory(
     Parameters
     ----------
     config : as `sweep.config.load_config` takes it
-    every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
-        per period of the fastest motion
+    at, every, samples : as of `sweep.trajectory`
     stop_early : end a trajectory once spin and count can no longer change, as a sweep does. Otherwise it goes to
         t_end, whatever the configuration says; with `t_end: settled` it always stops once settled
-    samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
-        samples of a run
     reporter : receives progress, counted in time, and messages; silent by default
-    at : a number, or an axis as in a configuration, by parameter; each combination is one trajectory. An axis of
-        `config` that is not named takes its first value
 
     Returns
     -------
-    Dataset over (trajectory, time): the series that the model supports, NaN after the end of a trajectory. Over
-    (trajectory): all results that a sweep gives for the cell, from the same steps, which the sampling does not change;
-    the status is `settled` if spin and count could no longer change after t_stop. A sample between two steps is one
+    Dataset over the cells, as of a run, and over time, as of `sweep.trajectory`. A sample between two steps is one
     shorter step away from the first of them.
 
     Raises
@@ -141,28 +134,13 @@ def trajectory(
     """
     if every is not None and not (is_number(each := plain_data(every)) and 0 < each < inf):
         raise fault_of(refusal(every, "a finite number > 0"), "every")
+    if not isinstance(stop_early, bool):
+        raise fault_of(refusal(stop_early, "True or False"), "stop_early")
     chosen = choose(config, at, samples)
     stops = stop_early or chosen.integrator.t_end >= FOREVER
     chosen = replace(chosen, integrator=chosen.integrator.model_copy(update={"stop_early": stops}))
     with blamed(chosen.origin):
-        found = _followed(chosen, every, reporter or Reporter())
-    if not samples or not load_config(config).distributions.keys() - at.keys():
-        return found
-    numbers = np.arange(found.sizes["trajectory"]) % samples
-    attributes = {"long_name": SAMPLE, "description": dataset.ROWS[SAMPLE]}
-    return found.assign_coords({SAMPLE: ("trajectory", numbers, attributes)})
-
-
-def first_values(config: Config, at: Mapping[str, Any]) -> str:
-    """Name the axes of `config` that take their first value because `at` does not give one; "" if there are none.
-
-    Raises a `InputError` first if the cells cannot be run.
-    """
-    choose(config, at)
-    config = config.at_medians
-    columns = {name: value.numbers for name, value in config.parameters.items()} | config.cases
-    left = [f"{name} = {values[0]:g}" for name, values in columns.items() if len({*values}) > 1 and name not in at]
-    return f"taking the first value of each axis not given: {', '.join(left)}" if left else ""
+        return _followed(chosen, every, reporter or Reporter())
 
 
 def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dataset:
@@ -193,20 +171,19 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     (found,) = job.by_grid(results(job, [each]))
     made = provenance(chosen, time.perf_counter() - count.began, grid.size, of=TRAJECTORY)
     labelled = dataset.label(chosen, grid, found, made)
-    flat = labelled.reset_coords(drop=False).rename({"case": "trajectory"}).drop_vars("trajectory")
-    index = ("trajectory", np.arange(grid.size), {"long_name": "trajectory"})
-    return flat.assign_coords(trajectory=index).assign(_described(times, series, kernel.model, chosen.units))
+    return labelled.assign(_described(grid, times, series, kernel.model, chosen.units))
 
 
-def _described(times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
-    """Return the series over (trajectory, time), with their attributes, in the order of `SERIES`."""
+def _described(grid: Grid, times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
+    """Return the series over the cells of `grid` and time, with their attributes, in the order of `SERIES`."""
+    series = {name: values.reshape(*grid.shape, -1) for name, values in series.items()}
     rows = {**SERIES, **{name: each for name, *each in model.series}}
     specs = {name: Variable("float64", *row) for name, row in rows.items()}
     time = xr.Variable("time", times, dataset.described(Variable("float64", u.TIME, "time t"), system))
-    return xr.Dataset(dataset.variables(specs, ("trajectory", "time"), series, system), {"time": time})
+    return xr.Dataset(dataset.variables(specs, (*grid.dims, "time"), series, system), {"time": time})
 
 
-def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> str:
+def estimate(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int | None = None) -> str:
     """Describe trajectories, steps, samples and time, a line each; parameters and errors as for `trajectory`."""
     chosen = choose(config, at, samples)
     columns, integrator = chosen.grid.columns(), chosen.integrator
@@ -221,8 +198,8 @@ def estimate(config: ConfigLike, at: Mapping[str, Any], samples: int | None = No
     )
 
 
-def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None) -> Config:
-    """Return `config` with the cells selected by `at` as cases, and dopri5; raise a `InputError` if they cannot run.
+def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int | None = None) -> Config:
+    """Return `config` with the cells selected by `at`, and dopri5; raise a `InputError` if they cannot run.
 
     Uncertain parameters that `at` does not name take their median, or else each of the `samples`.
     """
@@ -233,28 +210,27 @@ def choose(config: ConfigLike, at: Mapping[str, Any], samples: int | None = None
     other = {} if method and method.takes_every_step else {"method": PLAIN, "step": "auto"}
     config = replace(config, integrator=config.integrator.in_one_leg.model_copy(update=other))
     dataset.check_names(config, SERIES)
-    wanted = _numbers(config, at)
-    drawn = {name: np.array(values) for name, values in config.cases.items() if samples and name not in wanted}
-    config = config.at_medians
-    firsts = {name: v.numbers[0] for name, v in config.parameters.items()}
-    firsts |= {name: column[0] for name, column in config.cases.items()}
-    grid = Grid(wanted, {name: v for name, v in firsts.items() if name not in {*wanted, *drawn}}, drawn)
-    if grid.size > MAX_TRAJECTORIES:
-        raise fault_of(f"{grid.size} trajectories are too many; ask for at most {MAX_TRAJECTORIES}")
-    columns = grid.columns()
-    chosen = replace(config, parameters={}, cases={name: tuple(columns[name].tolist()) for name in firsts})
+    wanted = _values(config, {} if at is None else at)
+    config = config if samples else config.at_medians
+    left = {name: column for name, column in config.cases.items() if name not in wanted}
+    parameters, drawn = config.parameters | wanted, config.samples if left else None
+    chosen = replace(config, parameters=parameters, cases=left, samples=drawn)
+    if (cells := chosen.grid.size) > MAX_TRAJECTORIES:
+        raise fault_of(f"{cells} trajectories are too many; choose at most {MAX_TRAJECTORIES} cells", "at")
     if beyond := unfit(chosen) or misplaced(chosen):
         raise fault_of(beyond)
     return chosen
 
 
-def _numbers(config: Config, at: Mapping[str, Any]) -> dict[str, Array]:
+def _values(config: Config, at: Mapping[str, Any]) -> dict[str, Values]:
     """Return the values requested for each parameter; raise a `InputError` for the first that cannot be run."""
+    if not isinstance(at, Mapping):
+        raise fault_of(refusal(at, "values by parameter, such as {'mu': 60}"), "at")
     model = config.tier
     if unknown := next((name for name in at if name not in model.parameters), ""):
         message = f"is not a parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
-        raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", unknown)
-    return {name: np.array(numbers_of(config.table[name], value, config.unitless)) for name, value in at.items()}
+        raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", "at", unknown)
+    return {name: values_of(config.table[name], value, config.unitless, "at") for name, value in at.items()}
 
 
 Marks = list[Array]

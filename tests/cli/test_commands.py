@@ -62,7 +62,7 @@ DRY_RUNS = {
     "run --set method=auto --set mu=[1,1000]": ["cells:  12", "steps", "memory", "time"],
     "critical": ["bodies: 6 (mu 2 × b 3)", "cells", "steps", "memory", "time", "then"],
     "boundaries": ["cells:  12", "steps", "memory", "time", "then:   about 8 simulations for each point"],
-    "trajectory --at mu=40 --at mu=60": ["trajectories: 2", "steps", "samples", "time"],
+    "trajectory --at mu=40 --at mu=60": ["trajectories: 12", "steps", "samples", "time"],
 }
 """Commands, and how each of the lines that they say begins."""
 

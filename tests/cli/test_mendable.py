@@ -208,11 +208,10 @@ def test_a_missing_file_that_has_the_name_of_an_example_says_how_to_get_it(tmp_p
 
 
 CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
-    "one of them": (lambda d: d.isel(trajectory=0), "lacks the axis trajectory of status and 2 other things; it was"),
     "no spin": (lambda d: d.drop_vars("spin"), "lacks the variable spin; it was cut or averaged"),
     "averaged": (lambda d: d.mean("time", keep_attrs=True), "lacks the variable time and 1 other thing; it was cut"),
     "bare": (lambda d: d.drop_attrs(), "not a dataset of sweep, or sweep_kind was dropped; keep it with"),
-    "of nothing": (lambda d: d.isel(trajectory=slice(0)), "the axis trajectory has no values; select at least one"),
+    "of nothing": (lambda d: d.isel(mu=slice(0)), "the axis mu has no values; select at least one"),
 }
 """What may be done to a dataset of trajectories."""
 

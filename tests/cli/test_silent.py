@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from support import Write
 from support.cli import invoke
 
 import sweep
@@ -29,10 +28,13 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ("--var status --limits 0..5", "limits: status is drawn as categories, which have no scale; leave them out"),
-        ("--sel n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
-        ("--sel n0=0.066", "sel: n0 = 0.066 is far from all its values, 0.02 to 0.05; choose one of them"),
-        ("--sel n0=0.02 --sel n0=0.05", "--sel n0=0.05: n0 is given twice; draw one picture for each value"),
+        (
+            "--variable status --limits 0..5",
+            "limits: status is drawn as categories, which have no scale; leave",
+        ),
+        ("--at n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
+        ("--at n0=0.066", "--at n0: 0.066 is far from all its values, 0.02 to 0.05; choose one of them"),
+        ("--at n0=0.02 --at n0=0.05", "--at n0: must be one finite number, not [0.02, 0.05]"),
     ],
 )
 def test_what_a_picture_has_no_use_for_is_refused(options: str, said: str, file: Path) -> None:
@@ -44,9 +46,9 @@ def test_what_a_picture_has_no_use_for_is_refused(options: str, said: str, file:
 @pytest.mark.parametrize(
     ("options", "name"),
     [
-        ("--sel n0=0.04", "quick_n0=0.04.png"),
-        ("--var form_factor", "quick_form_factor.png"),
-        ("--x n0 --y mu --width 85mm --no-title", "quick_x=n0_y=mu_width=85mm_no-title.png"),
+        ("--at n0=0.04", "quick_n0=0.04.png"),
+        ("--variable form_factor", "quick_form_factor.png"),
+        ("--x n0 --y mu --width 85mm --title=", "quick_x=n0_y=mu_width=85mm_title=.png"),
         ("--limits 0..3", "quick_limits=0..3.png"),
     ],
 )
@@ -59,34 +61,20 @@ def test_the_picture_of_the_run_is_not_overwritten(options: str, name: str, file
 
 @pytest.mark.parametrize("value", [slice(0, 1), "a", [0.02, 0.05], np.nan, True])
 def test_a_selection_is_a_number(value: Any) -> None:
-    with pytest.raises(InputError, match=r"^sel: n0 = .*; give a finite number"):
-        sweep.plot(sweep.predict(GRID), sel={"n0": value})
+    with pytest.raises(InputError, match=r"^at\.n0: must be one finite number, not "):
+        sweep.plot(sweep.predict(GRID), at={"n0": value})
 
 
 def test_a_selection_is_any_number_near_a_value() -> None:
     maps = sweep.predict(GRID)
     for value in (0.05, np.float32(0.05), maps.n0[1], 0.06):
-        assert sweep.plot(maps, sel={"n0": value}).axes
+        assert sweep.plot(maps, at={"n0": value}).axes
 
 
 @pytest.mark.parametrize("every", [0, -1, np.nan, np.inf, "1", True])
 def test_the_time_between_samples_is_a_positive_number(every: Any) -> None:
     with pytest.raises(InputError, match=r"^every: must be a finite number > 0, not"):
         sweep.trajectory({"model": "averaged", "friction": {"mu": 60}}, t_end=20, every=every)
-
-
-TAKEN = "taking the first value of each axis not given: "
-
-
-def test_a_trajectory_says_which_values_it_takes(write: Write, tmp_path: Path) -> None:
-    line = ["trajectory", write(TEXT), "--output", tmp_path, "--at", "mu=60"]
-    assert f"{TAKEN}n0 = 0.02\n" in invoke(*line).stderr
-    assert TAKEN not in invoke(*line, "--at", "n0=0.05").stderr
-    with pytest.warns(UserWarning, match=f"^{TAKEN}n0 = 0.02$") as warned:
-        sweep.trajectory(write(TEXT), mu=60)
-    assert warned[0].filename == __file__
-    sweep.trajectory(write(TEXT), mu=60, n0=0.05)
-    sweep.trajectory(write(TEXT))  # the first cell, as documented
 
 
 @pytest.mark.parametrize("name", ["bracket", "deviation"])

@@ -51,7 +51,7 @@ def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
 
 def test_a_dataset_is_refused_as_a_configuration(small: xr.Dataset) -> None:
     with pytest.raises(InputError, match=r"^this is a dataset, not a configuration"):
-        sweep.trajectory(small, mu=40)
+        sweep.trajectory(small, at={"mu": 40})
 
 
 @pytest.mark.parametrize("table", [dict, pandas.DataFrame])

@@ -69,7 +69,7 @@ def patched(client: distributed.Client, target: str, value: Any) -> Iterator[Non
 def test_workers_of_a_scheduler_give_the_same_files(
     config: Path, tmp_path: Path, local: distributed.LocalCluster, by_threads: dict[str, bytes]
 ) -> None:
-    result = invoke("run", config, "--output", tmp_path, "--scheduler", local.scheduler_address, "--quiet")
+    result = invoke("run", config, "--output", tmp_path, "--client", local.scheduler_address, "--quiet")
     assert (result.exit_code, result.output) == (0, "")
     assert contents(tmp_path) == by_threads
 
@@ -130,7 +130,7 @@ def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
                 fault(client, local)
 
         heard = Heard(when_the_first_is_back)
-        found = sweep.run(config, tmp_path, reporter=heard, client=client)
+        found = sweep.run(config, tmp_path, progress=heard, client=client)
         assert heard.seen
         tasks = SMALL_TILES // 2
         assert tasks <= completed(local) <= tasks + lost
@@ -190,7 +190,7 @@ from sweep.engine import cluster
 cluster.PATIENCE = "1s"
 for address in sys.argv[3:]:
     try:
-        main(["run", sys.argv[1], "--output", sys.argv[2], "--scheduler", address, "--quiet"])
+        main(["run", sys.argv[1], "--output", sys.argv[2], "--client", address, "--quiet"])
     except SystemExit as end:
         print(end.code)
 """
@@ -234,7 +234,7 @@ def test_a_run_that_lost_its_scheduler_computes_what_is_missing_on_another(
         try:
             assert scheduler.stdout
             address = scheduler.stdout.readline().strip()
-            run = [sys.executable, "-m", "sweep", "run", config, "--output", out, "--quiet", "--scheduler", address]
+            run = [sys.executable, "-m", "sweep", "run", config, "--output", out, "--quiet", "--client", address]
             process = subprocess.Popen(run, cwd=ROOT, stderr=subprocess.PIPE, text=True)
             while not list(out.glob("tiles.checkpoint/0*.npz")):
                 assert process.poll() is None

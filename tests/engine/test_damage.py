@@ -64,7 +64,7 @@ def half(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(executor, "_rescale", lambda *_: 20)
         with pytest.raises(KeyboardInterrupt):
-            sweep.run(config, out, reporter=Heard(stop_in_the_second_group))
+            sweep.run(config, out, progress=Heard(stop_in_the_second_group))
     return out
 
 

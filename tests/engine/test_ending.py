@@ -52,10 +52,10 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
     assert list(found.reversals) == [1, 3]
     assert list(found.decided) == [1, 1]
     paper = {"name": "one", "friction": {"mu": 60.0}}
-    ends = [sweep.trajectory(paper, **cell, stop_early=True, t_end=600.0) for cell in cells]
-    assert [int(each.reversals[0]) for each in ends] == [1, 3]
-    begun = sweep.trajectory(paper, **cells[0], t_end=20.0)  # where the bound on its energy would let it settle
-    assert (int(begun.reversals[0]), int(begun.status[0])) == (0, TIME_LIMIT)
+    ends = [sweep.trajectory(paper, at=cell, stop_early=True, t_end=600.0) for cell in cells]
+    assert [int(each.reversals) for each in ends] == [1, 3]
+    begun = sweep.trajectory(paper, at=cells[0], t_end=20.0)  # where the bound on its energy would let it settle
+    assert (int(begun.reversals), int(begun.status)) == (0, TIME_LIMIT)
 
 
 @pytest.mark.usefixtures("short_chunks")

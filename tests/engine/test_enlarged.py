@@ -31,7 +31,7 @@ def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.D
     """The dataset after runs of these configurations in one folder, and what the last of them says."""
     for text in texts:
         reporter = Heard()
-        found = sweep.run(write(text), output, reporter=reporter, **options)
+        found = sweep.run(write(text), output, progress=reporter, **options)
     return found, reporter.notes
 
 
@@ -130,7 +130,7 @@ def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> Non
     grown(write, tmp_path / "out", ONE)
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
-            sweep.run(write(LATER), tmp_path / "out", reporter=Stop(2))
+            sweep.run(write(LATER), tmp_path / "out", progress=Stop(2))
         # The smaller dataset stays until the larger one is complete.
         assert xr.load_dataset(tmp_path / "out" / "small.nc", decode_times=False)["status"].size == 12
     (tmp_path / "out" / "small.nc").unlink()  # the run has kept it

@@ -80,9 +80,9 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
     monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
     monkeypatch.setattr(local, "BATCH", size)
     with pytest.raises(KeyboardInterrupt):
-        sweep.run(write(TEXT), tmp_path, reporter=Stop(3))
+        sweep.run(write(TEXT), tmp_path, progress=Stop(3))
     reporter = Heard()
-    found = swept(write(TEXT), tmp_path, reporter=reporter)
+    found = swept(write(TEXT), tmp_path, progress=reporter)
     same_numbers(found, edge)
     assert (reporter.seen[-1].done, reporter.seen[-1].failed) == (18, 0)
 
@@ -90,7 +90,7 @@ def test_tiles_of_impossible_bodies_and_a_resumed_run(
 def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_path: Path) -> None:
     sweep.run(write(TEXT), tmp_path, offset=[0.0, 0.3])
     reporter = Heard()
-    found = swept(write(TEXT), tmp_path, reporter=reporter)
+    found = swept(write(TEXT), tmp_path, progress=reporter)
     same_numbers(found, edge)
     assert "12 of 18 cells are reused" in reporter.notes[0]
     assert found.attrs["impossible"] == edge.attrs["impossible"]

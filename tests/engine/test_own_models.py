@@ -44,7 +44,7 @@ def test_the_pendulum_swings_as_scipy_says(few: xr.Dataset, folder: Path) -> Non
     def slopes(t: float, y: np.ndarray) -> list[float]:
         return [y[1], 1.2 * np.cos(2 / 3 * t) - np.sin(y[0]) - 0.5 * y[1]]
 
-    one = sweep.trajectory(folder / "pendulum.yaml", t_end=60, every=0.5, damping=0.5, torque=1.2).isel(trajectory=0)
+    one = sweep.trajectory(folder / "pendulum.yaml", t_end=60, every=0.5, damping=0.5, torque=1.2)
     rates = solve_ivp(slopes, (0, 60), [1.0, 0.0], "DOP853", one["time"].values, rtol=1e-12, atol=1e-12).y[1]
     np.testing.assert_allclose(one["spin"], rates, rtol=0, atol=1e-7)
     cell = few.sel(damping=0.5, torque=1.2)
@@ -93,7 +93,7 @@ def test_a_larger_run_of_the_same_file_takes_its_cells_over(few: xr.Dataset, fol
     (folder / "pendulum.py").rename(folder / "moved" / "same.py")
     reporter = Heard()
     more = FEW | {"torque": [0.5, 1.0, 1.2, 1.4, 1.5]}
-    larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", reporter=reporter, **more)
+    larger = sweep.run(folder / "pendulum.yaml", folder, model="moved/same.py", progress=reporter, **more)
     assert any(note.startswith("12 of 15 cells are reused") for note in reporter.notes)
     assert reporter.notes[0].startswith("running the code of ")
     same_numbers(larger.sel(torque=few["torque"]), few)

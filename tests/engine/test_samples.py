@@ -112,7 +112,7 @@ def test_intervals_of_random_samples_hold_as_often_as_they_say() -> None:
 def test_more_samples_take_over_the_fewer(write: Write, tmp_path: Path) -> None:
     more, reporter = SCENE.replace("32", "48"), Heard()
     sweep.run(write(SCENE), tmp_path)
-    found = sweep.run(write(more), tmp_path, reporter=reporter)
+    found = sweep.run(write(more), tmp_path, progress=reporter)
     assert reporter.notes[0].startswith("64 of 96 cells are reused")
     same_numbers(found, sweep.run(write(more)))
     assert sweep.load_config(write(found.attrs["config"])).samples == 48
@@ -122,14 +122,15 @@ def test_trajectories_of_samples_are_those_of_the_run(write: Write) -> None:
     scene = write(SCENE)
     found = sweep.run(scene, samples=5)
     seen = sweep.trajectory(scene, samples=5, b=[2, 3], every=20.0)
-    assert seen["sample"].values.tolist() == [0, 1, 2, 3, 4] * 2
-    for name in ("reversals", "t_last_reversal"):
-        np.testing.assert_array_equal(seen[name], found[name].values.ravel())
-    assert sweep.trajectory(scene, samples=3, b=2, n0=0.05, t_end=10).n0.values.tolist() == [0.05] * 3
-    named = {"samples": 3, "t_end": 10, "b": 2, **dict.fromkeys(sweep.load_config(scene).distributions, 0.02)}
-    assert "sample" not in sweep.trajectory(scene, **named).coords
-    medians = sweep.trajectory(scene, t_end=10)
-    assert (medians["n0"].item(), medians["x0"].item()) == (0.05, 0.01)
+    assert seen.spin.dims == (*found.reversals.dims, "time") == ("b", "sample", "time")
+    for name in ("reversals", "t_last_reversal", "probability"):
+        xr.testing.assert_equal(seen[name].drop_vars("time", errors="ignore"), found[name])
+    one = sweep.trajectory(scene, samples=3, at={"b": 2, "n0": 0.05}, t_end=10)
+    assert (one.spin.dims, one.n0.item()) == (("sample", "time"), 0.05)
+    all_named = {"b": 2, **dict.fromkeys(sweep.load_config(scene).distributions, 0.02)}
+    assert "sample" not in sweep.trajectory(scene, samples=3, at=all_named, t_end=10).coords
+    medians = sweep.trajectory(scene, at={"b": 2}, t_end=10)
+    assert (medians["n0"].item(), medians["x0"].item(), medians.spin.dims) == (0.05, 0.01, ("time",))
     with pytest.raises(sweep.InputError, match="samples: needs a parameter that is a distribution"):
         sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, samples=3)
 
@@ -183,7 +184,7 @@ def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:
         np.testing.assert_allclose([bar.get_height() for bar in axes.patches], expected, atol=1e-12)
     several = sweep.run(write(SCENE), t_end=300, b=np.linspace(2, 6, 5), mu=np.linspace(40, 200, 5), samples=4)
     assert len(maps(sweep.plot(several))) == min(several.sizes["count"], 3)
-    assert len(maps(sweep.plot(several, sel={"count": 1}))) == 1
+    assert len(maps(sweep.plot(several, at={"count": 1}))) == 1
     source = Source(several)
     shown = source.map("probability", "b", "mu", {"sample": 2, "count": 0})
     np.testing.assert_array_equal(shown.values, several["probability"].transpose("mu", "b", "count")[..., 0])
@@ -198,7 +199,7 @@ def test_the_probability_of_a_chosen_count(write: Write, given: bool) -> None:
 
     def drawn_of(dataset: xr.Dataset) -> Axes:
         ax = Figure().subplots() if given else None
-        return sweep.plot(dataset, "probability", sel={"count": 2}, ax=ax).axes[0]
+        return sweep.plot(dataset, "probability", at={"count": 2}, ax=ax).axes[0]
 
     (curve,) = drawn_of(two).lines
     np.testing.assert_array_equal(curve.get_ydata(), shares)

@@ -464,7 +464,7 @@ def test_parameters_leave_the_grid(visit: Open) -> None:
     wait(page, "curve legend", "/μ = 63.5.*reversals/.test(m.items[0].label.value)")
     curve = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=63.5, b=4, n0=0.05, t_end=1500)
     spin = model(page, "spin", "[...m.renderers[0].data_source.data.spin]")
-    assert spin[100] == pytest.approx(float(curve["spin"][0, 100]), abs=0.02)
+    assert spin[100] == pytest.approx(float(curve["spin"][100]), abs=0.02)
     enter(page, "parameter mu", "-5")
     page.get_by_text("mu has to be a finite number >= 0").wait_for()
     assert "mu:63.5" in page.url
@@ -484,7 +484,7 @@ def test_the_trajectory_is_played(clicked: Page) -> None:
 
 def test_the_body_turns_as_in_an_animation(clicked: Page) -> None:
     """Its outline, its middle and its trace lie where matplotlib's perspective puts them."""
-    one = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=70, b=4, n0=0.05, t_end=1500).isel(trajectory=0)
+    one = sweep.trajectory(ROOT / "configs" / "mu.yaml", mu=70, b=4, n0=0.05, t_end=1500)
     wait(clicked, "body", f"{FACES}.xs.length")
     times = one["time"].sel(time=slice(0, model(clicked, "time", "m.end"))).values
     scene = animation._Scene(one.expand_dims("trajectory"), times)

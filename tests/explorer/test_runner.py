@@ -51,7 +51,7 @@ class Heard(Job):
 def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
     """A spin below 1.5 n_c1 settles within a few units of time, and is seen nevertheless."""
     cell = {**setup.base, "mu": 75.0, "b": 3.0, "n0": -0.006}
-    assert sweep.trajectory(setup.config, **cell, stop_early=True)["t_stop"].item() < 10
+    assert sweep.trajectory(setup.config, at=cell, stop_early=True)["t_stop"].item() < 10
     assert whole(setup, cell).dataset["time"][-1] == setup.config.integrator.t_end
 
 
@@ -72,7 +72,7 @@ def test_a_curve_ends_where_nothing_happens_any_more(opened: xr.Dataset) -> None
     setup = Setup(Source(opened.assign_attrs(config=re.sub("t_end: [^,}]*", "t_end: 12000.0", config))))
     assert setup.config.integrator.t_end == 12000
     cell = {**setup.base, "mu": 40.0, "b": 4.0, "n0": 0.02}
-    curve, long = whole(setup, cell), sweep.trajectory(setup.config, **cell)
+    curve, long = whole(setup, cell), sweep.trajectory(setup.config, at=cell)
     assert curve.dataset["t_stop"] < 12000
     assert curve.dataset["reversals"] == long["reversals"].item() > 0
 

@@ -31,8 +31,8 @@ def averaged(one: xr.Dataset) -> np.ndarray:
 def test_margins_are_extremes_of_the_averaged_spin(mu: float, t_end: float) -> None:
     """The sweep leaves the first two before their nearest approach; the trajectories go on."""
     swept = sweep.run(SCENE, mu=mu)
-    one = sweep.trajectory(SCENE, mu=mu, t_end=t_end, every=2.0, estimate_errors=False)
-    spin = averaged(one.isel(trajectory=0))
+    one = sweep.trajectory(SCENE, at={"mu": mu}, t_end=t_end, every=2.0, estimate_errors=False)
+    spin = averaged(one)
     (changes,) = np.nonzero(spin[1:] * spin[:-1] < 0)
     assert len(changes) == int(swept.reversals)
     arc = np.abs(spin[changes[-1] + 1 :])

@@ -287,9 +287,9 @@ class Machine(RuleBasedStateMachine):
         scene = self.scene.with_({}, "cases", "samples")
         if self.rows["status"][cell[0]] == IMPOSSIBLE:
             with pytest.raises(InputError):
-                sweep.trajectory(scene, **values)
+                sweep.trajectory(scene, at=values)
         else:
-            followed = self.ask("follow", lambda: sweep.trajectory(scene, stop_early=True, every=every, **values))
+            followed = self.ask("follow", lambda: sweep.trajectory(scene, at=values, stop_early=True, every=every))
             if followed is not None and config.integrator.settles:
                 oracles.alike(oracles.rows(followed), oracles.rows(self.found, cell))
 
@@ -362,7 +362,7 @@ class Machine(RuleBasedStateMachine):
         with patch("sweep.engine.executor._rescale", lambda *_: 200), nothing_drawn():
             for sitting in range(2 + chunks):
                 with suppress(KeyboardInterrupt):
-                    call(self.config, folder, reporter=Stop(chunks + sitting), **taken)
+                    call(self.config, folder, progress=Stop(chunks + sitting), **taken)
             same_numbers(call(self.config, folder, **taken), whole)
         self.others.append(whole)
         if verb == "boundaries" and whole.sizes["point"]:
@@ -453,15 +453,15 @@ class Machine(RuleBasedStateMachine):
         known = [*dataset.data_vars, *words.DERIVED]
         given |= {"variable": str(known[at % len(known)])} if "variable" in given and at % 4 else {}
         given |= {name: str(dims[at % len(dims) - i]) for i, name in enumerate("xy") if name in given and dims}
-        if "sel" in given and numbers and at % 8:
+        if "at" in given and numbers and at % 8:
             dim = numbers[at % len(numbers)]
-            given["sel"] = {str(dim): float(dataset[dim][at % dataset.sizes[dim]])}
+            given["at"] = {str(dim): float(dataset[dim][at % dataset.sizes[dim]])}
             cut = dataset.isel({dim: at % dataset.sizes[dim]})
         how = given | ({"output": self._new(f".{form}")} if form else {})
         figure = self.ask("plot", lambda: dataset.sweep.plot(**how))
         if isinstance(figure, Figure):
             figure.draw_without_rendering()
-            if kind(dataset) == RUN and ("sel" not in given or cut is not dataset):
+            if kind(dataset) == RUN and ("at" not in given or cut is not dataset):
                 oracles.shown(cut, figure)
             if dims and {*dataset.indexes} - {"count"} == {*dims}:
                 turned = dataset.isel({dims[at % len(dims)]: slice(None, None, -1)}).sweep.plot(**given)

@@ -43,7 +43,8 @@ TEXTS: dict[str | None, tuple[str, ...]] = {
 
 VALUES: dict[str, tuple[Any, ...]] = {
     "x": AXES, "y": AXES, "variable": (*VARIABLES, *DERIVED),
-    "sel": ({"n0": 0.05}, {"mu": 60}, {"b": 3}, {"case": 0}), "limits": ((0, 5), (-1, 1), (1, 0), (0, 1e7)),
+    "at": ({"n0": 0.05}, {"mu": 60}, {"b": 3}, {"case": 0}),
+    "title": ("", "A title", "μ & $"), "limits": ((0, 5), (-1, 1), (1, 0), (0, 1e7)),
     "cmap": ("viridis", "no"), "width": ("85mm", "50mm", "3in"), "figsize": ((4, 3), (8, 8), (1, 1)),
     "bracket": (0.01, 0.1, 0.5), "deviation": (0.01, 0.1), "every": (0.5, 5.0, 1e3), "samples": (1, 2),
     "speed": (1.0, 10.0), "laws": ((), ("viscous",)),
@@ -55,7 +56,7 @@ _TYPES: dict[str, tuple[Any, ...]] = {"bool": (True, False), "float": (0.0, 5.0,
 
 
 def _options(command: click.Command) -> list[str]:
-    mine = [each for each in command.params if isinstance(each, click.Option) and each.name != "scheduler"]
+    mine = [each for each in command.params if isinstance(each, click.Option) and each.name != "client"]
     return [str(each.name) for each in mine if not isinstance(each.type, click.Path)]
 
 
@@ -74,7 +75,7 @@ def option(verb: str, name: str, number: int) -> list[str]:
         low, high = getattr(found.type, "min", None) or 0, getattr(found.type, "max", None) or np.inf
         usual = found.default if isinstance(found.default, int | float) else 1
         values = [n for n in (usual, 3 * usual, 10 * usual, 40) if low <= n <= high]
-    elif found.metavar == "PATH=VALUE":
+    elif found.name == "settings":
         path = random.choice(sorted(PATHS))
         values = [f"{path}={json.dumps(setting(path, number))}"]
     else:
@@ -91,7 +92,7 @@ def arguments(function: str, drawn: Draws) -> dict[str, Any]:
     return {name: Random(f"{name} {n}").choice(VALUES.get(name) or _TYPES[kinds[name]]) for name, n in drawn}
 
 
-_MINE = ("config", "source", "dataset", "film", "free", "output", "client", "reporter", "overrides", "values", "ax")
+_MINE = ("config", "source", "dataset", "film", "free", "output", "client", "progress", "overrides", "ax")
 """Arguments that the machine gives, or that need an object of the user."""
 
 TAKEN = {name: [each for each in known if each not in _MINE] for name, known in FUNCTIONS.items()}

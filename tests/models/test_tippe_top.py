@@ -48,7 +48,7 @@ def at_start(p: dict[str, float]) -> np.ndarray:
 def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
     top = TOP | more
     asked = {**top, "t_end": 15, "stop_early": False}
-    one = sweep.trajectory(CONFIG, tolerance=1e-12, every=1.0, **asked).isel(trajectory=0)
+    one = sweep.trajectory(CONFIG, tolerance=1e-12, every=1.0, **asked)
     start, times = at_start(top), one["time"].values
     y = solve_ivp(lambda _, y: slopes(y, top), (0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13).y
     e = y[:9].reshape(3, 3, -1)[:, 2]
@@ -57,7 +57,7 @@ def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
 
 
 def test_it_turns_over_while_energy_balances_and_jelletts_integral_stays() -> None:
-    one = sweep.trajectory(CONFIG, t_end=100, stop_early=False, **TOP).isel(trajectory=0)
+    one = sweep.trajectory(CONFIG, t_end=100, stop_early=False, **TOP)
     assert one["inclination"].min() < 0.2
     assert one["inclination"].max() > 3.0
     assert int(one["reversals"]) == 1

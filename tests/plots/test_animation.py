@@ -3,6 +3,7 @@
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -109,7 +110,7 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
     for source, values in ((config, setting), (tmp_path / "one.nc", {}), (sweep.open_dataset(tmp_path / "one.nc"), {})):
         sweep.animate(source, tmp_path / "clip.gif", begin=2, end=4, speed=10, **values)
         clips.append((tmp_path / "clip.gif").read_bytes())
-    stretch = ("--from", "2", "--to", "4", "--speed", "10")
+    stretch = ("--begin", "2", "--end", "4", "--speed", "10")
     assert invoke("animate", tmp_path / "one.nc", *stretch).exit_code == 0
     assert {*clips} == {(tmp_path / "one.gif").read_bytes()}
     refused(
@@ -121,8 +122,8 @@ def test_a_dataset_is_shown_as_its_configuration_is(write: Write, tmp_path: Path
 def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"^source: has no attitude"):
         animation.animate(turning().drop_vars("heading"))
-    for part in ({"trajectory": 0}, {"trajectory": []}, {"time": []}):
-        with pytest.raises(InputError, match=r"^source: has no axis trajectory or time"):
+    for part in ({"trajectory": []}, {"time": []}):
+        with pytest.raises(InputError, match=r"^source: has an axis without values"):
             animation.animate(turning().isel(part))
     with pytest.raises(InputError, match=r"^source: .*at most 6"):
         animation.animate(turning(7))
@@ -130,9 +131,6 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
         animation.animate(turning(), begin=11)
     with pytest.raises(InputError, match=r"^begin: nothing lies between"):
         animation.animate(turning(), begin=-np.inf, end=-1)
-    for speed in (0, -5, np.nan, np.inf):
-        with pytest.raises(InputError, match=f"speed: {speed:g}; give a finite number above zero"):
-            animation.animate(turning(), speed=speed)
     for name, speed, words in (
         ("clip.gif", 0.1, "80 s, and may last 60 s; give a speed of 0.133 or more, or write an mp4$"),
         (None, 1e-300, r"8e\+300 s, and may last 3600 s; give a speed of 0.00222 or more$"),
@@ -141,10 +139,34 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
             animation.animate(turning(), name and tmp_path / name, end=8, speed=speed)
     without = mpl.rc_context({"animation.ffmpeg_path": "no-such-program"})
     with without, pytest.raises(InputError, match="ffmpeg, which is not installed"):
-        animation.check(tmp_path / "clip.mp4")
+        animation.check(tmp_path / "clip.mp4", 0.0, None, None)
     refused(invoke("animate", ROOT / "configs" / "mu.yaml", "--output", "clip.avi"), "clip.avi: unknown format")
+
+
+@pytest.mark.parametrize(
+    ("argument", "values", "said"),
+    [
+        ("speed", (0, -5, np.nan, np.inf, "fast", True), "a finite number > 0"),
+        ("begin", (np.nan, np.inf, None), "a finite number"),
+        ("end", (np.nan, np.inf, -1, "1"), "a finite number above begin, 0"),
+    ],
+)
+def test_a_wrong_number_is_refused_before_anything_is_simulated(
+    argument: str, values: tuple[Any, ...], said: str, write: Write
+) -> None:
+    for value in values:
+        with pytest.raises(InputError, match=f"^{argument}: must be {said}, not "):
+            sweep.animate(write(), progress=Stop(0), **{argument: value})
+        if isinstance(value, float):
+            refused(invoke("animate", write(), f"--{argument}={value}"), f"--{argument}: must be {said}, not {value}")
+
+
+def test_a_dataset_takes_no_cells_and_no_settings(tmp_path: Path) -> None:
+    for name, values in {"at": {"at": {"mu": 60}}, "t_end": {"t_end": 3.0}}.items():
+        with pytest.raises(InputError, match=f"^{name}: cannot be used with a dataset; give the configuration"):
+            sweep.animate(turning(), tmp_path / "clip.gif", **values)
 
 
 def test_a_model_without_an_attitude_is_refused_before_it_is_simulated() -> None:
     with pytest.raises(InputError, match="model: the bodies of effective have no attitude; animate slip or noslip"):
-        sweep.animate({"model": "effective", "friction": {"mu": 60}}, reporter=Stop(0))
+        sweep.animate({"model": "effective", "friction": {"mu": 60}}, progress=Stop(0))

@@ -74,7 +74,7 @@ def test_dots_at_uncertain_cells_can_be_seen_on_a_large_map() -> None:
 
 
 def test_a_single_cell_is_written_not_drawn() -> None:
-    (axes,) = picture.plot(made(), sel={"mu": 80, "b": 3, "n0": 0.05}).axes
+    (axes,) = picture.plot(made(), at={"mu": 80, "b": 3, "n0": 0.05}).axes
     assert not axes.axison
     assert not axes.lines
     (text,) = axes.texts
@@ -252,10 +252,10 @@ def test_a_page_fits_a_screen(starts: int) -> None:
 
 def test_the_nearest_value_is_drawn() -> None:
     dataset = made(n0=[0.02, 0.05])
-    figure = picture.plot(dataset, sel={"n0": 0.04})
+    figure = picture.plot(dataset, at={"n0": 0.04})
     assert "n₀ = 0.05" in constants(figure)
     with pytest.raises(ValueError, match="no axis q; the axes are mu, b, n0"):
-        picture.plot(dataset, sel={"q": 1})
+        picture.plot(dataset, at={"q": 1})
 
 
 def test_logarithmic_and_uneven_axes_are_drawn_so() -> None:
@@ -291,7 +291,7 @@ def test_axes_in_any_order_of_values() -> None:
         ({"figsize": (3, 2), "ax": Figure().subplots()}, "figsize: the given axes have their own size"),
         ({"width": "85mm", "ax": Figure().subplots()}, "width: the given axes have their own size"),
         ({"cmap": mpl.colormaps["magma"]}, "cmap: there is no colour map <matplotlib"),
-        ({"sel": ["n0"]}, "sel: must be values by axis"),
+        ({"at": ["n0"]}, "at: must be values by axis"),
         ({"width": 3}, "width: 3; give a length between 50 and 1000 mm"),
         ({"limits": (0, 2), "variable": "ratio", "ax": Figure().subplots()}, r"limits: 0..2; give numbers above zero"),
         ({"variable": "q"}, "variable: there is no variable q; choose reversals"),
@@ -329,7 +329,7 @@ def test_the_suffix_names_the_format(suffix: str, tmp_path: Path) -> None:
     write(tmp_path / "made.nc", made())
     for name in ("one", "two"):
         target = tmp_path / f"{name}.{suffix}"
-        result = invoke("plot", tmp_path / "made.nc", "--var", "reversals", "--sel", "n0=0.06", "--output", target)
+        result = invoke("plot", tmp_path / "made.nc", "--variable", "reversals", "--at", "n0=0.06", "--output", target)
         assert result.exit_code == 0, result.output
         assert "n0 = 0.05, nearest to 0.06" in result.stdout
         assert target.read_bytes().startswith(MAGIC[suffix])
@@ -341,10 +341,10 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     for option, text, form in (
         ("--limits", "3", "LOW..HIGH"),
         ("--limits", "3..1", "LOW..HIGH"),
-        ("--sel", "n0", "NAME=NUMBER"),
+        ("--at", "n0", "NAME=VALUE"),
     ):
         refused(invoke("plot", tmp_path / "made.nc", option, text), f"{option} {text}: must be {form}")
-    result = invoke("plot", tmp_path / "made.nc", "--sel", "n0=0.06", "--var", "nothing")
+    result = invoke("plot", tmp_path / "made.nc", "--at", "n0=0.06", "--variable", "nothing")
     assert (result.exit_code, result.stdout) == (2, "")
 
 

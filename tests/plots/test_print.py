@@ -18,7 +18,7 @@ from sweep.results.netcdf import open_dataset, write
 
 KINDS: dict[str, dict[str, Any]] = {
     "maps": {},
-    "a map": {"variable": "reversals", "sel": {"n0": 0.05}},
+    "a map": {"variable": "reversals", "at": {"n0": 0.05}},
     "a status": {"variable": "status"},
     "curves": {"x": "b", "sel": {"mu": 60.0}},
 }
@@ -125,12 +125,12 @@ def test_a_width_is_a_length(width: str, small: xr.Dataset, tmp_path: Path) -> N
 def test_the_command_draws_for_print_without_a_title(small: xr.Dataset, tmp_path: Path) -> None:
     write(tmp_path / "small.nc", small)
     target = tmp_path / "small.svg"
-    result = invoke("plot", tmp_path / "small.nc", "--width", "3.5 in", "--no-title", "--output", target)
+    result = invoke("plot", tmp_path / "small.nc", "--width", "3.5 in", "--title", "", "--output", target)
     assert result.exit_code == 0, result.output
     assert 'width="252pt"' in target.read_text(encoding="utf-8")
     title = str(open_dataset(tmp_path / "small.nc").attrs["title"])
     assert title in {text.get_text() for text in texts(picture.plot(small))}
-    assert title not in {text.get_text() for text in texts(picture.plot(small, title=False))}
+    assert title not in {text.get_text() for text in texts(picture.plot(small, title=""))}
 
 
 def test_settings_of_the_user_are_obeyed() -> None:

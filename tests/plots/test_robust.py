@@ -91,7 +91,7 @@ def test_what_cannot_be_drawn_is_refused(damage: Callable[[xr.Dataset], xr.Datas
 def test_an_axis_without_numbers_has_no_nearest_value() -> None:
     stacked = made().stack(both=("mu", "b"))
     with pytest.raises(InputError, match="the axis both is stacked; unstack it"):
-        picture.plot(stacked, sel={"both": 1.0})
+        picture.plot(stacked, at={"both": 1.0})
 
 
 @pytest.mark.parametrize(

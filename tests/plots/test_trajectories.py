@@ -148,7 +148,7 @@ def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
     file, told = told_of("critical", write(), *settings)
     assert "critical spins of 2 bodies (mu 2)" in told
     assert "n_c1, positive spin: 1 no friction, 1 found; 0.0024" in told
-    assert invoke("plot", file, "--var", "n_c2_simulated").exit_code == 0
+    assert invoke("plot", file, "--variable", "n_c2_simulated").exit_code == 0
     figure = picture.plot(file)
     assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 8
     assert not figure.axes[0].get_legend()

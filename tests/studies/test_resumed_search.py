@@ -99,7 +99,7 @@ def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_
 
 def test_progress_is_told(config: Path) -> None:
     following = Heard()
-    sweep.trajectory(config, mu=[60, 75], b=3, t_end=3000, reporter=following)
+    sweep.trajectory(config, at={"mu": [60, 75], "b": 3}, t_end=3000, progress=following)
     done = [progress.done for progress in following.seen]
     assert done == sorted(done)
     assert done[0] < 0.2 * 6000 < done[-1] == 6000 == following.seen[-1].cells

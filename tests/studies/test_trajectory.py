@@ -60,7 +60,7 @@ def test_attitude_and_path_are_those_of_newton_and_euler(
     config, told = load_config(scene, {"t_end": t_end, "tolerance": 1e-12}), Heard()
     cell, model = config.grid.columns(), config.equations
     parameters = {"surface": scene["body"].get("surface")} | {name: float(v[0]) for name, v in cell.items()}
-    one = sweep.trajectory(config, every=t_end / 50, reporter=told).isel(trajectory=0)
+    one = sweep.trajectory(config, every=t_end / 50, progress=told)
     assert {progress.unit for progress in told.seen} == {"s" if "units" in scene else "sqrt(c/g)"}
     assert one["energy_error"] < 1e-7
     assert one.attrs.get("surface") == parameters["surface"]
@@ -79,11 +79,11 @@ STANDARD = "name: standard\nfriction: {mu: [60, 75]}\nintegrator: {t_end: 1500}\
 
 def test_sampling_does_not_touch_the_steps(write: Write) -> None:
     swept = sweep.run(write(STANDARD), method="dopri5")
-    followed = sweep.trajectory(write(STANDARD), mu=[60, 75], every=3.0, stop_early=True)
+    followed = sweep.trajectory(write(STANDARD), every=3.0, stop_early=True)
     np.testing.assert_array_equal(followed.spin_final, swept.spin_final)
     np.testing.assert_array_equal(followed.energy_error, swept.energy_error)
     for i in range(2):
-        last = followed.isel(trajectory=i).dropna("time")
+        last = followed.isel(mu=i).dropna("time")
         assert float(last.spin[-1]) == float(swept.spin_final[i])
         assert float(last.time[-1]) == pytest.approx(float(swept.t_stop[i]), rel=1e-15)
         assert float(last.time[0]) == 0
@@ -91,12 +91,12 @@ def test_sampling_does_not_touch_the_steps(write: Write) -> None:
 
 def test_trajectories_of_different_steps_are_sampled_at_the_same_times(write: Write) -> None:
     config = sweep.load_config(write(STANDARD), {"t_end": 60.0})
-    both = sweep.trajectory(config, mu=[60, 300], every=0.7)
+    both = sweep.trajectory(config, at={"mu": [60, 300]}, every=0.7)
     assert both.step[0] != both.step[1]
-    assert both.spin.dims == ("trajectory", "time")
+    assert both.spin.dims == ("mu", "time")
     np.testing.assert_allclose(both.time, np.append(np.arange(0, 60, 0.7), 60), atol=1e-11)
     for i, mu in enumerate((60, 300)):
-        one = sweep.trajectory(config, mu=mu, every=1e-6).isel(trajectory=0)  # every step
+        one = sweep.trajectory(config, mu=mu, every=1e-6)  # every step
         for name in ("spin", "contact_x", "dissipated", "ripple_free_spin"):
             expected = np.asarray(CubicSpline(one.time, one[name])(both.time))
             np.testing.assert_allclose(both[name][i], expected, rtol=0, atol=3e-7 * np.abs(expected).max())
@@ -106,7 +106,7 @@ def test_trajectories_of_different_steps_are_sampled_at_the_same_times(write: Wr
 def test_a_trajectory_goes_on_to_its_end_and_stays_where_a_sweep_says(n0: float, write: Write) -> None:
     """A sweep leaves both before t = 25; the rattle of the second grows later, and turns the spin."""
     config = sweep.load_config(write(STANDARD), {"mu": 75.0, "n0": n0, "t_end": 8000.0})
-    swept, one = sweep.run(config), sweep.trajectory(config, every=20.0).isel(trajectory=0)
+    swept, one = sweep.run(config), sweep.trajectory(config, every=20.0)
     assert float(swept.t_stop) < 25
     assert (float(one.t_stop), float(one.time[-1]), one.sizes["time"]) == (8000, pytest.approx(8000), 401)
     assert float(one.spin[-1]) == pytest.approx(float(swept.spin_rest), rel=4e-3)
@@ -115,20 +115,20 @@ def test_a_trajectory_goes_on_to_its_end_and_stays_where_a_sweep_says(n0: float,
 
 
 def test_a_trajectory_without_an_end_ends_when_it_has_settled(write: Write) -> None:
-    assert float(sweep.trajectory(write(STANDARD), mu=75, n0=-0.006, t_end=float("inf")).t_stop[0]) < 20
+    assert float(sweep.trajectory(write(STANDARD), mu=75, n0=-0.006, t_end="settled").t_stop) < 20
 
 
 def test_more_samples_than_memory_holds_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweep.studies.trajectory.MAX_SAMPLES", 100)
     config = load_config({"friction": {"mu": 60}}, {"t_end": 60.0})
     with pytest.raises(sweep.InputError, match=r"every: the samples are too many .*; give 1\.2 "):
-        sweep.trajectory(config, b=[3, 4], every=1.1)
-    assert sweep.trajectory(config, b=[3, 4], every=1.2).sizes["time"] == 51
+        sweep.trajectory(config, at={"b": [3, 4]}, every=1.1)
+    assert sweep.trajectory(config, at={"b": [3, 4]}, every=1.2).sizes["time"] == 51
 
 
 def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
     """Its step is beyond the stability limit, about 2.8 over the fastest rate of friction, so that no step is whole."""
-    one = sweep.trajectory(write(STANDARD), mu=100, method="dopri5", step=0.15).isel(trajectory=0)
+    one = sweep.trajectory(write(STANDARD), mu=100, method="dopri5", step=0.15)
     assert (one.sizes["time"], float(one.time[0]), float(one.t_stop)) == (1, 0, 0)
     assert one.status == DIVERGED
     assert float(one.spin[0]) == pytest.approx(0.05)
@@ -147,7 +147,7 @@ def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
     from sweep.explorer.player import Player
     from sweep.explorer.runner import Curve
 
-    one, player = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).isel(trajectory=0), Player([])
+    one, player = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0), Player([])
     for shown, dataset in ((True, one), (False, one.rename({"a": "a1"}))):
         player.show(Curve(dataset, np.zeros(0), 0.0), "#000000", 60.0)
         assert player.root.visible == shown
@@ -155,7 +155,7 @@ def test_the_explorer_shows_no_body_of_unknown_shape(write: Write) -> None:
 
 def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
     config = sweep.load_config(write(STANDARD), {"t_end": 8000.0})
-    both = sweep.trajectory(config, mu=60, n0=[0.001, 0.05], every=5.0, stop_early=True)
+    both = sweep.trajectory(config, at={"mu": 60, "n0": [0.001, 0.05]}, every=5.0, stop_early=True)
     assert both.t_stop[0] < both.t_stop[1] - 5
     for i in range(2):
         np.testing.assert_array_equal(np.isfinite(both.spin[i]), both.time <= both.t_stop[i] * (1 + 1e-12))
@@ -163,7 +163,7 @@ def test_series_are_missing_after_the_end_of_a_trajectory(write: Write) -> None:
 
 
 def test_trajectory_shows_the_motion(write: Write) -> None:
-    one = sweep.trajectory(write(STANDARD), mu=60).isel(trajectory=0)
+    one = sweep.trajectory(write(STANDARD), mu=60)
     assert all("long_name" in v.attrs for v in one.variables.values())
     assert float(one.contact_x[0]) == pytest.approx(0.01)
     assert float(one.contact_y[0]) == pytest.approx(0.01)

@@ -1,8 +1,9 @@
 """Runs that are interrupted, and whether two came to the same numbers."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -10,23 +11,36 @@ import xarray as xr
 
 import sweep
 from support import STANDARD
-from sweep.engine.reporter import Progress, Reporter
 from sweep.kernels import methods
 from sweep.kernels.status import SETTLED
 
 
-class Heard(Reporter):
-    """Keeps what a run tells, and does something at each chunk."""
+class Seen(NamedTuple):
+    """What a run says of its progress."""
+
+    share: float
+    done: float
+    cells: float
+    unit: str
+    failed: int
+
+
+_DONE = re.compile(r"(\d+) of (\d+) (\S+) done(?:, (\d+) failed)?")
+
+
+class Heard:
+    """A function that keeps the progress and the messages of a run, and does something at each chunk."""
 
     def __init__(self, act: Callable[[], object] = lambda: None) -> None:
-        self.act, self.notes, self.seen = act, list[str](), list[Progress]()
+        self.act, self.notes, self.seen = act, list[str](), list[Seen]()
 
-    def chunk(self, progress: Progress) -> None:
-        self.seen.append(progress)
-        self.act()
-
-    def note(self, message: str) -> None:
-        self.notes.append(message)
+    def __call__(self, share: float, text: str) -> None:
+        if said := _DONE.fullmatch(text):
+            done, cells, unit, failed = said.groups()
+            self.seen.append(Seen(share, float(done), float(cells), unit, int(failed or 0)))
+            self.act()
+        else:
+            self.notes.append(text)
 
 
 class Stop(Heard):
@@ -54,12 +68,12 @@ def in_sittings(chunks: int, config: Any, output: Path) -> tuple[xr.Dataset, int
     """
     interruptions, last = 0, Stop(chunks)
     while True:
-        reporter = Stop(chunks)
+        heard = Stop(chunks)
         try:
-            result = sweep.run(config, output, reporter=reporter)
-            return result, interruptions, reporter if reporter.seen else last
+            result = sweep.run(config, output, progress=heard)
+            return result, interruptions, heard if heard.seen else last
         except KeyboardInterrupt:
-            interruptions, last = interruptions + 1, reporter
+            interruptions, last = interruptions + 1, heard
 
 
 def settled(scene: Any, share: float, **settings: Any) -> tuple[xr.Dataset, xr.Dataset, np.ndarray]:
