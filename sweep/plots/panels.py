@@ -119,7 +119,8 @@ def nearest(dataset: xr.Dataset, at: Mapping[str, float]) -> dict[str, int]:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
             raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "at")
         check(dataset, [name], name)
-        value = plain_data(wanted)
+        of_axis = isinstance(wanted, xr.DataArray) and wanted.attrs.get("units") == dataset[name].attrs.get("units")
+        value = plain_data(wanted.values if of_axis else wanted)
         if not (is_number(value) and math.isfinite(value)):
             raise fault_of(refusal(wanted, "one finite number"), "at", name)
         values = dataset[name].values

@@ -20,7 +20,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "maps": {},
     "a map": {"variable": "reversals", "at": {"n0": 0.05}},
     "a status": {"variable": "status"},
-    "curves": {"x": "b", "sel": {"mu": 60.0}},
+    "curves": {"x": "b", "at": {"mu": 60.0}},
 }
 
 
