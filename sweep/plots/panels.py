@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -105,7 +106,7 @@ def choose(
     return Panels(dataset, whole, names, compared, across, indices(dataset, rest))
 
 
-def nearest(dataset: xr.Dataset, at: Mapping[str, float]) -> dict[str, int]:
+def nearest(dataset: xr.Dataset, at: Mapping[str, Any]) -> dict[str, int]:
     """Return the index along each axis of `at` of the value that is nearest to the requested one.
 
     Raises
