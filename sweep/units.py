@@ -67,7 +67,7 @@ WRITTEN: dict[Unit, dict[str, float]] = {
 """Units that users may write, as multiples of SI units; products of them are understood as well."""
 
 _FACTORS = {name: (scale, unit) for unit in (LENGTH, MASS, ANGLE, TIME) for name, scale in WRITTEN[unit].items()} | {
-    "radian": (1.0, ANGLE), "rpm": (pi / 30, SPIN), "N": (1.0, Unit(length=1, time=-2, mass=1)),
+    "radian": (1.0, ANGLE), "dps": (_DEGREE, SPIN), "rpm": (pi / 30, SPIN), "N": (1.0, Unit(length=1, time=-2, mass=1)),
 }  # fmt: skip
 _FACTOR = r"(/?) ?([^\W\d_]+|°)(?: ?(-?\d+))?"
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from sweep.config import tables
 from sweep.config.document import text_of
-from sweep.config.tables import GAPS, NAMED, SEPARATORS, Table
+from sweep.config.tables import GAPS, SEPARATORS, Table, named
 from sweep.faults import InputError, brief, counted, either, fault_of, suggestion
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
@@ -22,11 +22,26 @@ MOST_ROWS = 20_000
 """Most rows of a film; a longer film is thinned evenly, since more rows add time and hardly any information."""
 
 # Column names of trackers and phones, without the unit in parentheses: Sensor Logger `seconds_elapsed` and `z` (its
-# `time` counts nanoseconds since 1970), Physics Toolbox `wz`, Tracker `ω`, `θ` and `θr`. The first match counts.
+# `time` counts nanoseconds since 1970), SensorLog `motionRotationRateZ`, Physics Toolbox `wz`, Tracker `ω`, `θ` and
+# `θr`. The first match counts.
 _NAMES: dict[str, tuple[str, ...]] = {
     "time": ("seconds elapsed", "time", "t"),
     "spin": ("spin", "n", "angular velocity", "omega", "ω"),
-    "gyroscope": ("gyroscope z", "gyro z", "omega z", "wz", "ωz", "ω z"),
+    "gyroscope": (
+        "gyroscope z",
+        "gyro z",
+        "gyr z",
+        "rotation rate z",
+        "motion rotation rate z",
+        "gyro rotation z",
+        "omega z",
+        "gyroz",
+        "gyrz",
+        "gz",
+        "wz",
+        "ωz",
+        "ω z",
+    ),
     "heading": ("heading", "angle", "theta", "θ", "θr"),
     "error": ("error", "sigma", "uncertainty"),
 }
@@ -150,8 +165,7 @@ def _asked(table: Table, time_column: str, spin_column: str) -> dict[str, int]:
     for option, text in (("--time-column", time_column), ("--spin-column", spin_column)):
         if not text:
             continue
-        named = NAMED.fullmatch(text.strip())
-        name, unit = (named[1], named[2]) if named else (text, "")
+        name, unit = named(text)
         if name not in table.names:
             words = f"there is no column {brief(text)}{suggestion(name, table.names)}; "
             raise fault_of(f"{words}it has {brief(', '.join(table.names))}", option, file=table.file, line=table.top)
@@ -168,7 +182,9 @@ def _kind(name: str, unit: str) -> str:
 
 
 def _plain(name: str) -> str:
-    return re.sub(r"[_\s]+", " ", name).casefold()
+    """Return a name for comparison: "gyro z" for "GyroZ", and "spin" for "Spin Run #1", as Capstone writes it."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", re.sub(r"[_\s]+", " ", name)).casefold()
+    return re.sub(r" run #\d+$", "", spaced)
 
 
 def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array:

@@ -32,7 +32,7 @@ class Table:
     top: int
     """Line number of the header."""
     names: list[str]
-    """Names of the columns, without the unit in brackets after them."""
+    """Names of the columns, without the unit in brackets after or within them."""
     units: list[str]
     """Units of the columns, from the header or the row below it; "" where there is none."""
     under: int
@@ -86,8 +86,7 @@ class Table:
         return [cell if (value := number(cell)) is None else value for cell in cells]
 
 
-NAMED = re.compile(r"(.*?)\s*(?:[(\[]([^)\]]*)[)\]])?", re.DOTALL)
-"""Split a name from the unit in parentheses that may follow it."""
+_BRACKETS = re.compile(r"\s*[(\[]([^)\]]*)[)\]]\s*")
 
 Lines = list[tuple[int, list[str]]]
 """Return the cells of lines, each with its line number."""
@@ -103,13 +102,20 @@ def read(file: str, text: str) -> Table:
     """
     separator, ((top, header), *rows) = _lines(file, text)
     _require_even(file, (top, header), rows, separator)
-    named = [NAMED.fullmatch(cell) for cell in header]
-    names, units = ([(each[part] or "").strip() if each else "" for each in named] for part in (1, 2))
+    names, units = map(list, zip(*map(named, header), strict=True))
     under = top
     if len(rows) > 1 and _is_of_units(rows[0][1]):
         under, below = rows.pop(0)
         units = _united(file, names, (top, units), (under, [cell.strip("()[] ") for cell in below]))
     return Table(file, separator, top, names, units, under, [line for line, _ in rows], [row for _, row in rows])
+
+
+def named(text: str) -> tuple[str, str]:
+    """Split a name from its unit, which is in brackets at the end, or within the name as in "Spin (deg/s) Run #1"."""
+    for each in reversed([*_BRACKETS.finditer(text)]):
+        if each.end() == len(text) or any(factor(each[1], unit) for unit in WRITTEN):
+            return f"{text[: each.start()]} {text[each.end() :]}".strip(), each[1].strip()
+    return text.strip(), ""
 
 
 def _lines(file: str, text: str) -> tuple[str, Lines]:

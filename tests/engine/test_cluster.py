@@ -198,7 +198,7 @@ for address in sys.argv[3:]:
 
 def test_a_scheduler_that_does_not_answer_is_reported(config: Path, tmp_path: Path) -> None:
     """In a process of its own, for what dask still says when that ends: one line for each is all that is printed."""
-    addresses = ["tcp://127.0.0.1:1", "nonsense", "foo://here:1"]
+    addresses = ["tcp://127.0.0.1:1", "tls://127.0.0.1:1", "nonsense", "foo://here:1"]
     done = python("-c", UNANSWERED, config, tmp_path, *addresses)
     assert done.stdout.split() == ["2"] * len(addresses)
     lines = done.stderr.splitlines()

@@ -39,6 +39,12 @@ TIME, UP = TIMES + 3, SPINS - 2
         ("Gyroscope.csv", "time,seconds_elapsed,z,y,x", [1e18 + TIME * 1e9, TIME, UP, SPINS, SPINS]),
         ("toolbox.csv", "time,wx,wy,wz", [TIME, SPINS, SPINS, UP]),
         ("tracker.csv", "t,x,y,ω (rad/s)", [TIME, SPINS, SPINS, UP]),
+        ("capstone.csv", "Time (s) Run #1,Spin (deg/s) Run #1,Time (s) Run #2", [TIME, np.degrees(UP), 2 * TIME]),
+        ("capstone.csv", "Time (s) Run #1,Angular Velocity (deg/s) Run #1", [TIME, np.degrees(UP)]),
+        ("film.csv", "t,spin (dps)", [TIME, np.degrees(UP)]),
+        *(("film.csv", f"time,{name}", [TIME, UP]) for name in ("gyrZ", "GyroZ", "motionRotationRateZ", "gz")),
+        ("log.csv", "time (s),gyroRotationX (rad/s),gyroRotationZ (rad/s)", [TIME, SPINS, UP]),
+        ("log.csv", "time (s),spin rate (raw) z (dps)", [TIME, np.degrees(UP)]),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("minus", ["-", "−"])
@@ -48,7 +54,7 @@ def test_columns_of_phones_and_trackers_are_known_with_their_units(
     (mark,) = {each for each in ",;\t" if each in header}
     found = film.read(write(header + table("", *columns, mark=mark).replace("-", minus), name))
     np.testing.assert_allclose([found.time, found.value], [TIMES, UP], rtol=1e-12, atol=1e-12)
-    assert found.what == ("spin" if "spin" in header or "ω" in header else "gyroscope")
+    assert found.what == ("spin" if re.search("spin|Spin|ω|Angular", header) and "z" not in header else "gyroscope")
     assert (found.left_out, found.clock == "ms", found.error) == (0, "ms" in header, None)
 
 
@@ -74,6 +80,11 @@ def test_columns_may_be_asked_for_by_name(write: Write) -> None:
     found = film.read(path, "clock (ms)", "turn (deg/s)")
     np.testing.assert_allclose([found.time, found.value], [TIMES, SPINS], rtol=1e-12, atol=1e-12)
     assert [film.read(path, "", each).what for each in ("turn", "z", "turn (deg)")] == ["spin", "gyroscope", "heading"]
+    path = write(table("Time (s) Run #1,Pendulum (deg) Run #1,gyrZ (dps)", TIMES, np.degrees(SPINS), UP), "film.csv")
+    heading, gyroscope = (film.read(path, "", each) for each in ("Pendulum (deg) Run #1", "gyrZ"))
+    assert (heading.what, gyroscope.what) == ("heading", "gyroscope")
+    np.testing.assert_allclose([heading.value, gyroscope.value], [SPINS, np.radians(UP)], rtol=1e-12, atol=1e-12)
+    path = write(table("clock,time (s),spin (rad/s),turn,z", TIMES * 1e3, TIMES, UP, np.degrees(SPINS), UP), "film.csv")
     with pytest.raises(InputError, match=r"--spin-column: there is no column tunr .* .did you mean turn"):
         film.read(path, "", "tunr (deg/s)")
 
