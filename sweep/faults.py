@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from os.path import exists
 
 Path = tuple[str | int, ...]
 """Keys and list indices from the top of a document."""
@@ -118,3 +119,21 @@ class InputError(Error):
 def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> InputError:
     """Return the error for one fault that has no column."""
     return InputError([Fault(file, line, None, path, message)])
+
+
+class CompileError(RuntimeError):
+    """Code that becomes part of a kernel does not compile; the message names the place in the fewest lines.
+
+    Attributes
+    ----------
+    places : the files and lines that Numba's message names, from the outermost function inwards
+    reason : why compiling failed
+    """
+
+    def __init__(self, places: Sequence[tuple[str, int]], reason: str) -> None:
+        self.places, self.reason = places, reason
+        file, line = next((place for place in reversed(places) if exists(place[0])), ("a kernel", 0))
+        super().__init__(
+            f"{file}:{line}: does not compile: {reason}\n"
+            "  with NUMBA_DISABLE_JIT=1 the same code runs in plain Python, where a debugger stops"
+        )

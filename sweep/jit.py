@@ -6,6 +6,7 @@ looks inside Numba (`tests/test_numba.py` lists what for); all others keep to it
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import itertools
 import os
@@ -18,10 +19,12 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from threading import RLock, current_thread
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
+from sweep.faults import CompileError
 from sweep.meaning import INLINED, Unknown, meaning
 from sweep.sources import hashed, versions
 
@@ -229,6 +232,7 @@ def _short(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+_FUNCTION = re.compile(r"No implementation of function Function\(<function \S+ at 0x([0-9a-f]+)>")
 _FILE = re.compile(r'File "(.+?)", line (\d+)')
 
 
@@ -237,6 +241,8 @@ def compiler_said(error: Exception) -> tuple[list[tuple[str, int]], str]:
 
     An error of anything else has no places and no reason.
     """
+    if isinstance(error, CompileError):
+        return [*error.places], error.reason
     if not type(error).__module__.startswith("numba"):
         return [], ""
     where = getattr(error, "loc", None)
@@ -244,8 +250,37 @@ def compiler_said(error: Exception) -> tuple[list[tuple[str, int]], str]:
     places += [(file, int(line)) for file, line in _FILE.findall(str(error))]
     # Numba says, from the outermost function inwards: that it failed, and why.
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    why = [after for before, after in pairwise(lines) if "Failed in" in before]
-    return places, (why or lines)[-1]
+    reason = [after for before, after in pairwise(lines) if "Failed in" in before] or lines
+    return places + _called_last(str(error), reason[-1]), reason[-1]
+
+
+def _called_last(message: str, reason: str) -> list[tuple[str, int]]:
+    """Return the place in the innermost function that a message of Numba's names by its address, where it gives none.
+
+    It is the line with the name that the reason quotes, or else that of the function.
+    """
+    wanted = {int(address, 16) for address in _FUNCTION.findall(message)[-1:]}
+    found = [each for each in gc.get_objects() if id(each) in wanted and isinstance(each, FunctionType)]
+    quoted = re.search(r"'(\w+)'", reason)
+    places = []
+    for code in (each.__code__ for each in found if os.path.exists(each.__code__.co_filename)):
+        lines = Path(code.co_filename).read_text(encoding="utf-8").splitlines()
+        inside = range(code.co_firstlineno, max(line or 0 for *_, line in code.co_lines()) + 1)
+        named = [line for line in inside if quoted and re.search(rf"\b{quoted[1]}\b", lines[line - 1])]
+        places.append((code.co_filename, (named or [*inside])[0]))
+    return places
+
+
+@contextmanager
+def condensed() -> Iterator[None]:
+    """Turn the two hundred lines of an error of Numba's compiler into a `CompileError`."""
+    try:
+        yield
+    except Exception as error:
+        places, reason = compiler_said(error)
+        if not reason:
+            raise
+        raise CompileError(places, reason) from None
 
 
 _LOADING = RLock()
@@ -293,11 +328,17 @@ class Cached:
             self._dispatcher(*arguments)
 
     def compile(self) -> None:
-        """Compile it, or load it from disk, so that no timing of a run includes that."""
+        """Compile it, or load it from disk, so that no timing of a run includes that.
+
+        Raises
+        ------
+        CompileError
+            if Numba cannot compile it.
+        """
         # Numba compiles on one thread at a time, but while it loads from disk another thread finds it half ready.
         with _LOADING:
             if not self.is_ready():
-                with nullcontext() if self.is_compiled() else compiling():
+                with nullcontext() if self.is_compiled() else compiling(), condensed():
                     self._dispatcher.compile(self._types)
 
     def is_ready(self) -> bool:

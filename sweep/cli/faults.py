@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import click
 
-from sweep.faults import Error, Fault, InputError, fault_of, printable
+from sweep.faults import CompileError, Error, Fault, InputError, fault_of, printable
 from sweep.interrupt import INTERRUPTED
 from sweep.parameters import Parameter
 
@@ -99,4 +99,7 @@ class Commands(click.Group):
             say(str(_in_options(error, self.commands[ctx.invoked_subcommand or ""])), err=True)
         except Error as error:
             say(str(error), err=True)
+        except CompileError as error:  # of whoever edits the code: the place says more than a traceback
+            say(str(error), err=True)
+            sys.exit(1)
         sys.exit(WRONG_INPUT)

@@ -24,6 +24,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 
+from sweep.faults import CompileError
 from sweep.interrupt import point
 from sweep.jit import Cached, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
@@ -59,6 +60,9 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
 _SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
+_DOES_NOT_COMPILE = 3
+"""Exit code of a process that prints the places and the reason of a `CompileError`."""
+
 _POLL = 0.05
 """Time in seconds between two looks at the processes."""
 
@@ -75,6 +79,8 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
     ------
     InputError
         if a user's model cannot be compiled.
+    CompileError
+        if other code cannot.
     """
     kernels = list(kernels)
     if users := [kernel.model for kernel in kernels if kernel.model.origin and not kernel.advancing.is_compiled()]:
@@ -138,13 +144,16 @@ def _compile(jobs: list[Job]) -> None:
                 running.append(process)
             time.sleep(_POLL)
             point()
-            running = [process for process in running if process.poll() is None]
+            for process in running:
+                if process.poll() == _DOES_NOT_COMPILE and process.stdout:
+                    raise CompileError(*json.loads(process.stdout.read()))
+            running = [process for process in running if process.returncode is None]
 
 
 def _start(job: tuple[str, ...], origin: Origin | None) -> subprocess.Popen[bytes]:
     # Nothing else is ever written to stdin: it closes when this process ends, however it ends.
     command = [sys.executable, "-m", __name__, *job]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     if origin and process.stdin:
         with suppress(BrokenPipeError):  # it has failed: its piece stays missing
             process.stdin.write(json.dumps(vars(origin)).encode() + b"\n")
@@ -166,8 +175,14 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
         model = find(name)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     gc.disable()  # the garbage collector's search for cycles takes a twentieth of the time
-    for function in _PIECES[piece](make_kernel(method, model, measure)):
-        function.compile()
+    try:
+        for function in _PIECES[piece](make_kernel(method, model, measure)):
+            function.compile()
+    except CompileError as error:
+        if model.origin:  # the run finds the place in the user's file
+            raise
+        print(json.dumps([error.places, error.reason]), flush=True)
+        os._exit(_DOES_NOT_COMPILE)
 
 
 if __name__ == "__main__":

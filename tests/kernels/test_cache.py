@@ -75,3 +75,17 @@ def edit(file: Path, old: str, new: str) -> None:
     assert old in text
     file.write_text(text.replace(old, new, 1), encoding="utf-8")
     os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+@pytest.mark.campaign
+def test_a_typo_in_a_hook_is_named_in_two_lines(copy: Path) -> None:
+    margin = copy / "sweep" / "kernels" / "measures" / "margin.py"
+    line = margin.read_text(encoding="utf-8").splitlines().index("        @inline") + 3
+    lines = margin.read_text(encoding="utf-8").splitlines()
+    lines.insert(line - 1, "            gruop[0] = 1.0")
+    margin.write_text("\n".join(lines), encoding="utf-8")
+    scene = ["-m", "sweep", "run", ROOT / "configs" / "quick.yaml", "--quiet", "--set", "integrator.method=dopri5"]
+    said = python(*scene, "--output", copy, folder=copy, code=1, NUMBA_CACHE_DIR="").stderr.splitlines()
+    assert len(said) == 2
+    assert said[0].startswith(f"{margin}:{line}: does not compile: ")
+    assert "gruop" in said[0]
