@@ -444,9 +444,10 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     from sweep.explorer.server import serve_beside
     from sweep.explorer.setup import usable
     from sweep.explorer.slices import Source, open_source
+    from sweep.faults import local_path
     from sweep.results.kind import require_whole
 
-    source = open_source(Path(dataset)) if isinstance(dataset, str | Path) else Source(require_whole(dataset))
+    source = open_source(local_path(dataset)) if isinstance(dataset, str | Path) else Source(require_whole(dataset))
     return serve_beside(source, usable(source), height)
 
 
@@ -501,12 +502,11 @@ def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Datas
     >>> sweep.open_dataset("runs/spins.nc").n0.values
     array([0.02, 0.05])
     """
-    from pathlib import Path
-
+    from sweep.faults import local_path
     from sweep.results.kind import opened
 
     register()
-    return opened(Path(path), load=load)
+    return opened(local_path(path), load=load)
 
 
 class Accessor:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from os.path import exists
+from pathlib import Path as FilePath
 
 Path = tuple[str | int, ...]
 """Keys and list indices from the top of a document."""
@@ -119,6 +122,14 @@ class InputError(Error):
 def fault_of(message: str, *path: str | int, file: str = "", line: int | None = None) -> InputError:
     """Return the error for one fault that has no column."""
     return InputError([Fault(file, line, None, path, message)])
+
+
+def local_path(path: str | os.PathLike[str]) -> FilePath:
+    """Return the path of a file or a folder; raise an `InputError` if it is an address such as s3://… of another
+    place."""
+    if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", address := os.fspath(path)):
+        raise fault_of("an address, where only files of this machine are read and written; copy it here", file=address)
+    return FilePath(path)
 
 
 class CompileError(RuntimeError):

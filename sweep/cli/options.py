@@ -11,13 +11,21 @@ import click
 from click.shell_completion import CompletionItem
 
 from sweep.cli.faults import refuse, say
-from sweep.faults import brief
+from sweep.faults import brief, local_path
 from sweep.parameters import PARAMETERS
 
 if TYPE_CHECKING:
     from sweep.config import Config
 
-PATH = click.Path(path_type=Path)
+
+class _Local(click.Path):
+    """A path of this machine."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ARG002
+        return local_path(value)
+
+
+PATH = _Local()
 
 
 def examples() -> dict[str, Path]:

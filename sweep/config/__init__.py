@@ -21,7 +21,7 @@ from sweep.config.document import plain_data
 from sweep.config.messages import explain
 from sweep.config.schema import Integrator
 from sweep.config.values import Values, in_si
-from sweep.faults import Fault, InputError, fault_of
+from sweep.faults import Fault, InputError, fault_of, local_path
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.models.general.laws import LAWS
@@ -111,7 +111,7 @@ def _source(config: ConfigLike) -> document.Document:
     if isinstance(config, Mapping):
         return document.Document("", plain_data(config))
     if not isinstance(config, Config):
-        return document.read(Path(config))
+        return document.read(local_path(config))
     if config.source:
         return deepcopy(config.source)
     values = config.document()

@@ -28,6 +28,9 @@ from sweep.units import number as number
 _RANGE = re.compile(rf"({NUMERAL}[^.:]*)\.\.({NUMERAL}[^.:]*):({NUMERAL})")
 _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None, ".inf": inf, "-.inf": -inf, ".nan": nan}
 
+_IN_WORDS = {"but found another document": "a file holds one configuration; remove what follows the line ---"}
+"""Messages of ruamel that need other words."""
+
 _DEEPEST = 100
 """Deepest nesting of brackets that is accepted."""
 
@@ -204,6 +207,7 @@ def _compose(text: str, file: str) -> Node | None:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         words = getattr(error, "problem", None) or getattr(error, "context", None) or str(error)
         problem = "nested too deeply" if isinstance(error, RecursionError) else words.split("\n")[0]
+        problem = _IN_WORDS.get(problem, problem)
         line, column = (mark.line + 1, mark.column + 1) if mark else (None, None)
         raise InputError([Fault(file, line, column, (), f"not YAML: {problem}")]) from None
 

@@ -13,7 +13,7 @@ import numpy as np
 from sweep.config import tables
 from sweep.config.document import text_of
 from sweep.config.tables import GAPS, SEPARATORS, Table, named
-from sweep.faults import InputError, brief, counted, either, fault_of, suggestion
+from sweep.faults import InputError, brief, counted, either, fault_of, local_path, suggestion
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
 from sweep.units import ANGLE, SPIN, TIME, Unit, factor
@@ -95,7 +95,7 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
         if the file does not exist, or has no time or data column, an unknown unit, decreasing times, too few rows, or
         text instead of numbers.
     """
-    table = tables.read(str(path), text_of(Path(path)))
+    table = tables.read(str(path), text_of(local_path(path)))
     found, asked = _columns(table), _asked(table, time_column, spin_column)
     if spin_column:
         found = {name: place for name, place in found.items() if name not in get_args(Seen)}

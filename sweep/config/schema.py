@@ -73,8 +73,8 @@ LATER = 1e6
 
 _SETTLED = "settled"
 
-LATEST = 1e12
-"""Largest `t_end`, in sqrt(c/g)."""
+EARLIEST, LATEST = 1e-6, 1e12
+"""Smallest and largest `t_end`, in sqrt(c/g)."""
 
 MAX_CELLS_IN_MEMORY = 2**24
 """Most cells of a sampled run, which holds all its arrays in memory."""
@@ -106,9 +106,9 @@ class Integrator(Strict):
     t_end: Annotated[
         float,
         BeforeValidator(lambda raw: FOREVER if raw == _SETTLED else _in_si(raw)),
-        Allowed(f"{_SETTLED} or a number > 0 and <= {LATEST:g}"),
+        Allowed(f"{_SETTLED} or a number >= {EARLIEST:g} and <= {LATEST:g}"),
     ] = Field(
-        default=T_END, gt=0, le=LATEST,
+        default=T_END, ge=EARLIEST, le=LATEST,
         description="time at which every trajectory ends, in sqrt(c/g) or, with `units: SI`, in s; or `settled`: no "
         f"limit but {FOREVER:g}. The default is in the table below",
     )  # fmt: skip

@@ -120,7 +120,7 @@ def named(text: str) -> tuple[str, str]:
 
 def _lines(file: str, text: str) -> tuple[str, Lines]:
     """Split the non-empty lines into cells, and find their separator; raise a `InputError` if there are none."""
-    text = _without_title(text)
+    text = _without_title(re.sub("\r\n?", "\n", text))
     try:
         separator = _separator(text)
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, skipinitialspace=True, strict=True)

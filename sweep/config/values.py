@@ -14,7 +14,7 @@ from pydantic_core import PydanticCustomError
 from sweep.config.distributions import FAMILIES, Distribution
 from sweep.config.document import is_number, number, plain_data
 from sweep.config.messages import explain, wrong
-from sweep.faults import either, fault_of, refusal
+from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.parameters import Parameter
 from sweep.units import ANGLE, NUMERAL, WRITTEN, Unit, quantity, unit_in, unit_of
 
@@ -151,11 +151,14 @@ def in_si(units: Unit | str, raw: Any) -> tuple[Any, str]:
 
 
 def _parse_range(parameter: Parameter, raw: dict[str, Any]) -> Values:
+    for key in (each for each in raw if each not in Range.model_fields):
+        hint = suggestion(key, [*Range.model_fields, *FAMILIES])
+        words = f"give {', '.join(Range.model_fields)} of a range, or a distribution: {either(FAMILIES)}"
+        raise wrong(f"unknown key{hint}; {words}", key)
     try:
         span = Range.model_validate(raw)
     except ValidationError as error:
-        # Report an unknown key first: it explains why another is missing.
-        path, (message, _) = max(explain(error.errors(), Range).items(), key=lambda found: found[1][1])
+        path, (message, _) = next(iter(explain(error.errors(), Range).items()))
         raise wrong(message, *path) from None
     for value in (numbers := span.values()):
         if not parameter.allows(value):

@@ -21,7 +21,7 @@ from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import Earlier, Enlarged, is_whole, reason_against, taken_over
 from sweep.engine.reporter import Count, Reporter
 from sweep.engine.whole import Whole
-from sweep.faults import FileError
+from sweep.faults import FileError, local_path
 from sweep.grid import Tile
 from sweep.interrupt import deferred, point
 from sweep.models.user.blame import blamed
@@ -58,7 +58,7 @@ def run(
     if output is None:
         with connected(client) as there:
             return _compute(config, Store(), reporter, there).dataset()
-    files = RunFiles(Path(output), config.name, config.picture)
+    files = RunFiles(local_path(output), config.name, config.picture)
     with files.locked(reporter.note), connected(client) as there:
         if fresh:
             _forget_pictures(config, files)

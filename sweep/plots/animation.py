@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 
 from sweep.config import Config
 from sweep.config.document import is_number, plain_data
-from sweep.faults import fault_of, refusal
+from sweep.faults import fault_of, local_path, refusal
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
 from sweep.plots.figure import constants_in_lines, zero_line
@@ -113,7 +113,7 @@ def check(output: str | Path | None, begin: float, end: float | None, speed: flo
         raise fault_of(refusal(speed, "a finite number > 0"), "speed")
     if output is None:
         return
-    path = Path(output)
+    path = local_path(output)
     if suffix(path) not in FORMATS:
         raise fault_of(f"{path}: unknown format; write a gif, mp4 or html", "output")
     if suffix(path) == "mp4" and not FFMpegWriter.isAvailable():

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sweep.config.document import is_number, plain_data
-from sweep.faults import fault_of, refusal
+from sweep.faults import fault_of, local_path, refusal
 from sweep.plots import (
     boundaries,
     critical,
@@ -156,7 +156,7 @@ def plot(
             title,
         )
     if output is not None:
-        save(figure, Path(output))
+        save(figure, local_path(output))
     return figure
 
 
@@ -166,7 +166,7 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
         if source.name not in {*VARIABLES, *DERIVED}:
             raise fault_of(f"{source.name or 'an array without a name'} is not a variable of a run; pass the dataset")
         return source.to_dataset().assign_attrs({ATTRIBUTE: RUN.name})
-    return source if isinstance(source, xr.Dataset) else open_dataset(Path(source))
+    return source if isinstance(source, xr.Dataset) else open_dataset(local_path(source))
 
 
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:

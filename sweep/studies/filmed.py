@@ -10,6 +10,7 @@ import xarray as xr
 from scipy.integrate import cumulative_trapezoid
 
 from sweep.engine.reporter import Reporter
+from sweep.faults import local_path
 from sweep.results.configuration import configuration
 from sweep.results.kind import FIT, kind, opened
 from sweep.studies.trajectory import trajectory
@@ -28,7 +29,7 @@ def shown(source: xr.Dataset | str | Path, reporter: Reporter | None = None) -> 
     InputError
         if the fit cannot be followed, or used a user-defined model.
     """
-    found = source if isinstance(source, xr.Dataset) else opened(Path(source))
+    found = source if isinstance(source, xr.Dataset) else opened(local_path(source))
     return _beside(found, reporter) if kind(found) is FIT else found
 
 

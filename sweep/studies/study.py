@@ -22,7 +22,7 @@ from sweep.engine.errors import ROUND_OFF
 from sweep.engine.reporter import Reporter
 from sweep.engine.run import carry_out
 from sweep.engine.whole import Whole
-from sweep.faults import either, fault_of, quote
+from sweep.faults import either, fault_of, local_path, quote
 from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.kernels.measures import default
@@ -169,7 +169,7 @@ class Task(NamedTuple):
         if output is None:
             with connected(client) as there:
                 return search(Store(), there)
-        files = RunFiles(Path(output), f"{config.name}_{verb}")
+        files = RunFiles(local_path(output), f"{config.name}_{verb}")
         with files.locked(reporter.note), connected(client) as there:
             if fresh:
                 files.discard()

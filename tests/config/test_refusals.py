@@ -8,6 +8,7 @@ from support import SMALL, Write
 from support.cli import invoke, refused
 from support.physics import MOMENTS, stone
 
+import sweep
 from sweep import InputError, load_config
 from sweep.faults import fault_of
 
@@ -64,8 +65,9 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (step("step: 5"), 5, "integrator.step", "must be auto or at most 0.802, a quarter of the rattle's period, not 5"),
     (step("step: 1.0e-320"), 5, "integrator.step", "steps to t_end; keep to 1e+15, or choose auto"),
     (step("method: auto, step: 0.1"), 5, "integrator.step", "must be auto with method: auto; or choose a method"),
-    (step("t_end: -1"), 5, "integrator.t_end", "must be settled or a number > 0 and <= 1e+12, not -1"),
-    (step("t_end: .inf"), 5, "integrator.t_end", "must be settled or a number > 0 and <= 1e+12, not inf"),
+    (step("t_end: -1"), 5, "integrator.t_end", "must be settled or a number >= 1e-06 and <= 1e+12, not -1"),
+    (step("t_end: 1e-300"), 5, "integrator.t_end", "must be settled or a number >= 1e-06 and <= 1e+12, not 1e-300"),
+    (step("t_end: .inf"), 5, "integrator.t_end", "must be settled or a number >= 1e-06 and <= 1e+12, not inf"),
     (step("t_end: settled, stop_early: false"), 5, "integrator.t_end", "settled needs stop_early, which is false; give a time"),
     (step("tolerance: 5e-324"), 5, "integrator.tolerance", "must be a finite number >= 1e-14 and < 1, not 5e-324"),
     (step("stop_early: no"), 5, "integrator.stop_early", "must be true, false or a finite number > 0, not 'no'"),
@@ -85,11 +87,12 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "cases: cells.parquet\n", 6, "cases", "cells.parquet: Parquet files are not supported; read it with pandas"),
     (small("10.0", "&a 10.0"), 2, "body.a", "a YAML tag or anchor"),
     ("- 1\n- 2\n", 1, "", "a configuration is a mapping of keys to values"),
-    (SMALL + "---\nname: b\n", 6, "", "not YAML"),
+    (SMALL + "---\nname: b\n", 6, "", "not YAML: a file holds one configuration; remove what follows the line ---"),
     *((SMALL + f"seed: {n}\n", 6, "seed", f"must be a whole number >= 0 and < 4294967296, not {n}") for n in (-1, 1.5, 2**32)),
     ("cases: {mu: [60]}\nbody: {b: [1, 2]}\n", 2, "body.b", "cannot be an axis together with cases"),
     (mu("{normal: [5, 9]}") + "samples: 32\n", 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, but 9 of 32 samples"),
     (drawn("{normal: [0.05, -0.01]}"), 4, "start.n0.normal[1]", "must be the standard deviation, a finite"),
+    (drawn("{normla: [0.05, 0.01]}"), 4, "start.n0.normla", "unknown key (did you mean normal?); give start, stop, num, spacing of a range, or a distribution: normal, lognormal or uniform"),
     (drawn("{uniform: [0.02, 0]}"), 4, "start.n0.uniform[1]", "must be the highest value, a finite number > 0.02"),
     (drawn("{normal: [0.05, 0.01], num: 3}"), 4, "start.n0", "a distribution together with other keys"),
     (drawn("0.05"), 6, "samples", "needs a parameter that is a distribution"),
@@ -184,6 +187,21 @@ def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> Non
     assert invoke("run", tmp_path / name).stderr == f"{tmp_path / name}: {said}\n"
 
 
+@pytest.mark.parametrize("verb", ["run s3://here/x.yaml", "info s3://here/x.nc", "run {} --output s3://here/out"])
+def test_an_address_is_no_file(verb: str, write: Write) -> None:
+    words = verb.format(write()).split()
+    assert invoke(*words).stderr == f"{words[-1]}: {FAR}\n"
+
+
+def test_an_address_is_no_file_in_python() -> None:
+    for call in (sweep.load_config, sweep.open_dataset, sweep.plot, lambda at: sweep.run({}, at, mu=60)):
+        with pytest.raises(InputError, match=f"^s3://here/x: {FAR}$"):
+            call("s3://here/x")
+
+
+FAR = "an address, where only files of this machine are read and written; copy it here"
+
+
 @pytest.mark.parametrize("mark", [b"\x89HDF\r\n\x1a\n", b"CDF\x02"])
 def test_a_dataset_is_no_configuration(mark: bytes, tmp_path: Path) -> None:
     (tmp_path / "x.nc").write_bytes(mark + bytes(100))
@@ -209,6 +227,7 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("mu\n", "cells.csv", "must have 1 to 1000000 rows under its first line, not 0"),
         ("", "cells.csv", "empty; its first line has to name the columns"),
         ("mu,x0\n60,0.01\n", "small.yaml:3:9: start.x0", "is also a column of cells.csv; remove one of the two"),
+        ("mu,b\r60,wide\r", "cells.csv:2:2: b", "must be a finite number > 0 and < 1e+06, not 'wide'"),
         ('mu\n"60', "cells.csv", "not a readable CSV file"),
         ("a (kg),mu\n20,60\n", "cells.csv:1:1: a", "is in 'kg'; its unit must be m, cm, mm, in or ft"),
         ("a (cm),mu\n20,60\n", "small.yaml:2:1: cases.a", "is in c here; give the number without cm, or set units"),

@@ -126,6 +126,13 @@ def test_a_trajectory_of_such_a_body_is_refused(write: Write) -> None:
         sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.05)
 
 
+@pytest.mark.parametrize("body", [{"b": 1}, {"b": 0.7, "c": 0.7}, {"b": 0.9, "offset": 0.1899999999999}])
+def test_a_body_that_rolls_like_a_ball_is_neutral(body: dict[str, float]) -> None:
+    """Not unstable: b² = c (c - offset), apart from rounding."""
+    with pytest.raises(InputError, match="upright rest is neutral"):
+        sweep.load_config({"friction": {"mu": 60}, "body": body})
+
+
 @pytest.mark.parametrize("change", [{"Izz": [21.0, 30.0]}, {"Ixy": [-0.3, -10.0]}])
 def test_no_number_is_made_up_for_a_body_that_cannot_be(write: Write, change: dict[str, list[float]]) -> None:
     """Its moments break the triangle inequality, or its matrix is not positive definite."""

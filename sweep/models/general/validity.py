@@ -35,7 +35,8 @@ def wrongs(columns: Columns, surface: Surface = ELLIPSOID) -> Iterator[tuple[Arr
     )
     with np.errstate(over="ignore"):  # infinitely stiff is stable
         k1, k2 = rigid_body.stiffness(columns, surface)
-    yield (
-        np.minimum(k1, k2) <= 0,
-        f"upright rest is not stable; keep the centre of mass below both centres of curvature, {surface.bounds}",
-    )
+    least, most = np.minimum(k1, k2), np.maximum(k1, k2)
+    neutral = (least <= 0) & (least >= -_ROUNDING * most)
+    below = f"keep the centre of mass below both centres of curvature, {surface.bounds}"
+    yield (least <= 0) & ~neutral, f"upright rest is not stable; {below}"
+    yield neutral, f"upright rest is neutral, so that the body need not rock back; {below}"
