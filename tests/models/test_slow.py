@@ -86,6 +86,19 @@ def test_counts_of_a_body_that_a_couple_slows(sigma: float) -> None:
     assert float(found.foreseen_sure.mean()) > 0.3
 
 
+def test_a_count_whose_last_reversal_a_drag_may_prevent_is_not_sure() -> None:
+    """Six by an independent integration too: the tiny mode that would turn the spin again grows back too early."""
+    found = sweep.run({"body": {"b": 3.0}, "friction": {"mu": 160.0, "sigma": 9.9727e-4}, "start": {"n0": 0.05},
+                       "measure": MEASURE})  # fmt: skip
+    assert (found.reversals, found.reversals_foreseen, found.foreseen_sure) == (6, 7, 0)
+
+
+def test_a_mode_that_fell_far_makes_no_count_sure() -> None:
+    """In the first body it falls below 1e-8; all other conditions hold for both."""
+    config = sweep.load_config({"body": {"b": [3.0, 4.0]}, "friction": {"mu": 150.0}, "start": {"n0": 0.02}})
+    assert slow.foresee(config.equations, config.grid.columns()).sure.tolist() == [False, True]
+
+
 def test_a_couple_makes_a_count_unsure_that_a_small_mode_decides() -> None:
     """The spin falls below the critical one while the mode that would reverse it is still tiny; it is foreseen to."""
     found = sweep.run({"body": {"b": 4.2}, "friction": {"mu": 109.0909, "sigma": 1e-3}, "start": {"n0": 0.02},

@@ -43,13 +43,17 @@ _OVER, _MOST_STEPS, _SLOWED = 1e-3, 3000, 0.1
 # The equations have failed if the spin exceeds what the energy allows by this factor.
 _FAR = 3.0
 
+# Since it last turned the spin, a mode may fall by this factor before it turns the spin again. The fall is that of its
+# rates: in its amplitude, a step excites it anew by mixing the modes, and a tiny mode then grows back too early.
+_DEEPEST = np.log(1e-8)
+
 # Eigenvalues differ by at least this share of the matrix; the squares of amplitudes may fall below the smallest number.
 _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
 # Where the lanes of each quantity begin in a group; complex numbers take two rows.
 (_Z1, _Z2, _V11, _V12, _V21, _V22, _REST, _BETWEEN, _N, _OLD, _COUNT, _KEEP, _STEP, _STEPS, _STATE, _SIZE, _D,
- _STRONG, _FAR_APART, _BENT_RATES, _BENT_TURN, _E1, _E2, _X, _GROUP) = (
-    _LANES * row for row in (*range(0, 16, 2), *range(16, 33)))  # fmt: skip
+ _STRONG, _FAR_APART, _BENT_RATES, _BENT_TURN, _E1, _E2, _X, _LOG1, _LOG2, _LOW1, _LOW2, _SUNK, _GROUP) = (
+    _LANES * row for row in (*range(0, 16, 2), *range(16, 38)))  # fmt: skip
 
 _RUNNING, _OVER_NOW, _FAILED = 0.0, 1.0, 2.0
 
@@ -227,7 +231,7 @@ def _longest(pace, f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
 
 
 def make_follow():
-    """Compiled (tables, starts, cells, factors, counts, over) -> None: follows the slow equations of `cells`.
+    """Compiled (tables, starts, cells, factors, counts, sound) -> None: follows the slow equations of `cells`.
 
     Parameters
     ----------
@@ -236,7 +240,8 @@ def make_follow():
     cells : which of them to follow
     factors : of T and Q, of d, of the changes in a step, and of the start spin: all 1, except to test how much a count
         depends on them
-    counts, over : get the numbers of reversals, and whether the equations describe the motion to its end, of `cells`
+    counts, sound : get the numbers of reversals of `cells`, and whether the equations describe the motion to its end,
+        where the mode that turns the spin last has not fallen too far before
 
     Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (λ_1 + λ_2*) at rest, of which the part
     that decays is left out: the simulated count is of the ripple-free spin.
@@ -270,9 +275,15 @@ def make_follow():
             (g1, g2, g12), both, running = _turns(sums, V), rate1 + np.conj(rate2), state == _RUNNING
             near, far = (_get(g, _REST, lane) * beat).real, 2.0 * quotient(g12 * z1 * np.conj(z2), both).real
             new = n - (far if g[_FAR_APART + lane] > 0.0 else near)
-            g[_COUNT + lane] += 1.0 if running & (new * g[_OLD + lane] < 0.0) else 0.0
+            reverses = running & (new * g[_OLD + lane] < 0.0)
+            g[_COUNT + lane] += 1.0 if reverses else 0.0
             g[_OLD + lane] = new
             h1, h2, cross = abs(g1), abs(g2), 2.0 * np.sqrt(square(g12) * f1 * f2)
+            first, second = reverses & (h1 * f1 >= h2 * f2), reverses & (h1 * f1 < h2 * f2)
+            low = g[_LOW1 + lane] if first else g[_LOW2 + lane]
+            g[_SUNK + lane] = (1.0 if low < _DEEPEST else 0.0) if reverses else g[_SUNK + lane]
+            g[_LOG1 + lane], g[_LOW1 + lane] = 0.0 if first else g[_LOG1 + lane], 0.0 if first else g[_LOW1 + lane]
+            g[_LOG2 + lane], g[_LOW2 + lane] = 0.0 if second else g[_LOG2 + lane], 0.0 if second else g[_LOW2 + lane]
             beating = cross / np.sqrt(square(both))
             lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
             over = (r1 < 0.0) & (r2 < 0.0) & (others + beating < _OVER * lasting)
@@ -301,6 +312,10 @@ def make_follow():
             e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
             n = (g[_N + lane] + step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-g[_D + lane] * step)
             steps = g[_STEPS + lane] + 1.0
+            g[_LOG1 + lane] += step * rate1.real
+            g[_LOG2 + lane] += step * rate2.real
+            g[_LOW1 + lane] = min(g[_LOW1 + lane], g[_LOG1 + lane])
+            g[_LOW2 + lane] = min(g[_LOW2 + lane], g[_LOG2 + lane])
             fails = (not abs(n) < _FAR) | (steps >= _MOST_STEPS)
             g[_STATE + lane] = _FAILED if (state == _RUNNING) & fails else state
             g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n, steps
@@ -329,7 +344,7 @@ def make_follow():
         g[_REST + _LANES + lane] = -2.0 * table[0, 6].real * both.imag / square(both)
 
     @called
-    def follow(tables, starts, cells, factors, counts, over):
+    def follow(tables, starts, cells, factors, counts, sound):
         g, t, s = np.zeros(_GROUP), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
         whose, following, begun = np.full(_LANES, -1), 0, 0
         g[_STATE : _STATE + _LANES] = _FAILED
@@ -337,7 +352,8 @@ def make_follow():
             for lane in range(_LANES):
                 if g[_STATE + lane] != _RUNNING:
                     if whose[lane] >= 0:
-                        counts[whose[lane]], over[whose[lane]] = g[_COUNT + lane], g[_STATE + lane] == _OVER_NOW
+                        counts[whose[lane]] = g[_COUNT + lane]
+                        sound[whose[lane]] = (g[_STATE + lane] == _OVER_NOW) & (g[_SUNK + lane] == 0.0)
                         whose[lane], following = -1, following - 1
                     if begun < len(cells):
                         cell = cells[begun]
