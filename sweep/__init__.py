@@ -8,7 +8,10 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 
-from sweep.api import HOMES, register
+if sys.platform == "win32":
+    raise ImportError("sweep runs on Linux and macOS; on Windows, install it in WSL, the Windows Subsystem for Linux")
+
+from sweep.api import HOMES, AfterXarray, register
 from sweep.api import __all__ as __all__
 
 TYPE_CHECKING = False  # True for type checkers; `typing` is not imported before Ctrl-C is taken care of
@@ -25,10 +28,12 @@ else:
             return version("rattleback-sweep")
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        found = getattr(import_module(HOMES.get(name, "sweep.api")), name)
-        if "xarray" in sys.modules:
-            register()
-        return found
+        return getattr(import_module(HOMES.get(name, "sweep.api")), name)
+
+
+sys.meta_path.insert(0, AfterXarray())
+if "xarray" in sys.modules:
+    register()
 
 
 def __dir__() -> list[str]:

@@ -5,8 +5,9 @@ Functions import what they need when they are called, since importing everything
 
 from __future__ import annotations
 
+import sys
 from contextlib import contextmanager
-from functools import cache
+from threading import Lock
 
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, SPIN_WIDTH
 
@@ -14,7 +15,9 @@ TYPE_CHECKING = False  # as in `sweep`
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from importlib.machinery import ModuleSpec
     from pathlib import Path
+    from types import ModuleType
     from typing import Any
 
     import xarray as xr
@@ -53,7 +56,6 @@ def _prepared(
     from sweep.config import load_config
     from sweep.progress import reporting
 
-    register()
     with reporting(progress) as reporter:
         checked = load_config(config, overrides, announce=reporter.note)
         _refuse_arguments(checked)
@@ -370,9 +372,9 @@ def animate(
 def fit(
     config: ConfigLike,
     film: str | Path | Film,
-    free: Sequence[str],
+    free: str | Sequence[str],
     *,
-    laws: Sequence[str] = (),
+    laws: str | Sequence[str] = (),
     time_column: str = "",
     spin_column: str = "",
     progress: bool | Callable[[float, str], None] | None = None,
@@ -439,7 +441,7 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     ModuleNotFoundError
         if Bokeh is not installed.
     """
-    from pathlib import Path
+    import xarray as xr
 
     from sweep.explorer.server import serve_beside
     from sweep.explorer.setup import usable
@@ -447,7 +449,10 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     from sweep.faults import local_path
     from sweep.results.kind import require_whole
 
-    source = open_source(local_path(dataset)) if isinstance(dataset, str | Path) else Source(require_whole(dataset))
+    if isinstance(dataset, xr.Dataset):
+        source = Source(require_whole(dataset))
+    else:
+        source = open_source(local_path(dataset, "dataset", "a dataset or the path of its file"))
     return serve_beside(source, usable(source), height)
 
 
@@ -475,7 +480,6 @@ def predict(config: ConfigLike, **overrides: Any) -> xr.Dataset:
     from sweep.config import load_config
     from sweep.results import dataset, kind
 
-    register()
     checked = load_config(config, overrides)
     found = prediction.predict(checked.tier, checked.grid, checked.measure).variables
     attributes = {kind.ATTRIBUTE: kind.RUN.name, "config": checked.label()}
@@ -505,8 +509,7 @@ def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Datas
     from sweep.faults import local_path
     from sweep.results.kind import opened
 
-    register()
-    return opened(local_path(path), load=load)
+    return opened(local_path(path, "path"), load=load)
 
 
 class Accessor:
@@ -546,9 +549,34 @@ class Accessor:
         return trajectory(configuration(self._dataset), **options)
 
 
-@cache
-def register() -> None:
-    """Register `Accessor` as the attribute `sweep` of every dataset."""
-    import xarray as xr
+_REGISTERING = Lock()
 
-    xr.register_dataset_accessor("sweep")(Accessor)  # type: ignore[no-untyped-call]
+
+def register() -> None:
+    """Register `Accessor` as the attribute `sweep` of every dataset, unless it is there."""
+    import xarray as xr  # before the lock: another thread that imports it may be about to come here
+
+    with _REGISTERING:
+        if "sweep" not in vars(xr.Dataset):
+            xr.register_dataset_accessor("sweep")(Accessor)  # type: ignore[no-untyped-call]
+
+
+class AfterXarray:
+    """A finder of modules that finds xarray as the others do, and calls `register` once it is imported."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if name != "xarray":
+            return None
+        others = (finder.find_spec(name, path, target) for finder in sys.meta_path if finder is not self)
+        spec = next(filter(None, others), None)
+        if spec and (loader := spec.loader):
+            execute = loader.exec_module
+
+            def exec_module(module: ModuleType) -> None:
+                execute(module)
+                register()
+
+            loader.exec_module = exec_module  # type: ignore[method-assign]
+        return spec

@@ -124,9 +124,16 @@ def fault_of(message: str, *path: str | int, file: str = "", line: int | None = 
     return InputError([Fault(file, line, None, path, message)])
 
 
-def local_path(path: str | os.PathLike[str]) -> FilePath:
-    """Return the path of a file or a folder; raise an `InputError` if it is an address such as s3://… of another
-    place."""
+def local_path(path: object, argument: str = "output", wanted: str = "the path of a file or a folder") -> FilePath:
+    """Return the path that an argument gives.
+
+    Raises
+    ------
+    InputError
+        if it is not text or a path, or an address of another place, such as s3://….
+    """
+    if not (isinstance(path, str | os.PathLike) and isinstance(os.fspath(path), str)):
+        raise fault_of(refusal(path, wanted), argument)
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", address := os.fspath(path)):
         raise fault_of("an address, where only files of this machine are read and written; copy it here", file=address)
     return FilePath(path)

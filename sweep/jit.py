@@ -18,13 +18,13 @@ from contextvars import ContextVar
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from threading import RLock, current_thread
+from threading import Lock, RLock, current_thread
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 
-from sweep.faults import CompileError
+from sweep.faults import CompileError, fault_of
 from sweep.meaning import INLINED, Unknown, meaning
 from sweep.sources import hashed, versions
 
@@ -128,7 +128,7 @@ def parallel(function: Callable[..., Any], types: str, specialisation: str) -> C
     types : of its arguments, as Numba writes a signature
     specialisation : tells apart what is made from the same function; one of them has one signature only
     """
-    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), types, specialisation)
+    return Cached(load_numba().njit(function, parallel=True, **OPTIONS), types, specialisation, launches=True)
 
 
 def serial(function: Callable[..., Any], types: str, specialisation: str) -> Cached:
@@ -212,8 +212,40 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix=_POOL)
 
 
-# A process that was forked has none of the threads of its parent, and would wait for them for ever.
-os.register_at_fork(after_in_child=_pool.cache_clear)
+_launched = _orphaned = False
+"""Whether a parallel function has run, in this process, and in a parent that it was forked from."""
+
+_LAUNCHING = Lock()
+
+
+def _after_fork() -> None:
+    """Forget the threads of the parent, which this process does not have: it would wait for them for ever."""
+    global _orphaned, _LAUNCHING
+    _pool.cache_clear()
+    _orphaned, _LAUNCHING = _orphaned or _launched, Lock()
+
+
+os.register_at_fork(after_in_child=_after_fork)
+
+
+@contextmanager
+def _launching() -> Iterator[None]:
+    """Keep other parallel functions from running: the threading layer `workqueue` ends a process that runs two.
+
+    Raises
+    ------
+    InputError
+        in a process that was forked after a run, if it has none of the threads of its parent.
+    """
+    global _launched
+    if _orphaned and load_numba().threading_layer() == "omp":  # the other layers start new threads
+        raise fault_of(
+            "this process was forked after a run, and has none of its threads; start processes by 'spawn', such as "
+            "multiprocessing.get_context('spawn').Pool()"
+        )
+    with _LAUNCHING:
+        _launched = True
+        yield
 
 
 def fingerprint(function: Callable[..., Any]) -> str:
@@ -313,7 +345,8 @@ class Cached:
     compiles nothing, and two branches keep their code side by side.
     """
 
-    def __init__(self, dispatcher: Any, types: str, specialisation: str) -> None:
+    def __init__(self, dispatcher: Any, types: str, specialisation: str, *, launches: bool = False) -> None:
+        self._launches = launches and not INTERPRETED
         self._dispatcher, self._types, self._cache, self._found = dispatcher, types, None, False
         if INTERPRETED:  # Numba has returned the function as it was
             return
@@ -324,7 +357,7 @@ class Cached:
         if not self.is_ready():
             self.compile()
         # Compiled code does not warn of a division by zero.
-        with np.errstate(all="ignore") if INTERPRETED else nullcontext():
+        with np.errstate(all="ignore") if INTERPRETED else _launching() if self._launches else nullcontext():
             self._dispatcher(*arguments)
 
     def compile(self) -> None:

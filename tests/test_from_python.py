@@ -74,6 +74,58 @@ def test_a_wrong_argument_is_called_by_its_name(function: Callable[..., Any], ki
         assert "\n" not in str(refusal.value)
 
 
+OF_A_CONFIG = "config: must be the path of a YAML file, a mapping with its contents, or a Config, not "
+OF_A_DATASET = "dataset: must be a dataset or the path of its file, not "
+
+WRONG_TYPES: dict[str, tuple[Callable[[], Any], str]] = {
+    "no configuration": (lambda: sweep.run(None), OF_A_CONFIG + "nothing"),
+    "a list": (lambda: sweep.critical([1]), OF_A_CONFIG + r"\[1\]"),
+    "bytes": (lambda: sweep.predict(b"quick.yaml"), OF_A_CONFIG + "b'quick.yaml'"),
+    "to animate": (lambda: sweep.animate(3), OF_A_CONFIG + "3"),
+    "to plot": (lambda: sweep.plot([1]), OF_A_DATASET + r"\[1\]"),
+    "to open": (lambda: sweep.open_dataset(3), "path: must be the path of a file or a folder, not 3"),
+    "output": (lambda: sweep.run(SAID, 3), "output: must be the path of a file or a folder, not 3"),
+    "picture": (lambda: sweep.plot(sweep.predict(SAID), output=b"x.png"), "output: must be the path of a file"),
+    "client": (lambda: sweep.run(SAID, client=3), "client: must be a distributed.Client or the address of a scheduler"),
+    "progress": (lambda: sweep.run(SAID, progress=3), "progress: must be True, False or a function of a number and a"),
+    "cells": (lambda: sweep.trajectory(SAID, at=[60]), "at: must be values by parameter, such as .*, not"),
+    "stop": (lambda: sweep.trajectory(SAID, stop_early=300.0), "stop_early: must be True or False, not 300"),
+    "film": (lambda: sweep.fit(SAID, 3, ["mu"]), "film: must be a Film or the path of a table, not 3"),
+    "free": (lambda: sweep.fit(SAID, "film.csv", 3), "free: must be a name or a list of names, not 3"),
+    "laws": (
+        lambda: sweep.fit(SAID, "film.csv", "mu", laws=[1]),
+        r"laws: must be a name or a list of names, not",
+    ),
+    "title": (lambda: sweep.plot(sweep.predict(SAID), title=False), "title: must be a text, or '' for none, not false"),
+}  # type: ignore[arg-type, list-item]
+
+
+@pytest.mark.parametrize("kind", WRONG_TYPES)
+def test_a_wrong_type_is_refused_in_a_sentence(kind: str) -> None:
+    call, said = WRONG_TYPES[kind]
+    with pytest.raises(InputError, match=f"^{said}"):
+        call()
+
+
+@pytest.mark.browser
+def test_only_a_dataset_can_be_explored() -> None:
+    with pytest.raises(InputError, match=f"^{OF_A_DATASET}"):
+        sweep.explore([SAID])  # type: ignore[arg-type]
+
+
+def test_progress_may_be_a_function() -> None:
+    """It hears every chunk, the share that is done, and messages; what it raises ends the run."""
+    heard = list[tuple[float, str]]()
+    sweep.run(SAID, progress=lambda share, text: heard.append((share, text)))
+    assert heard[-1] == (1.0, "4 of 4 cells done, 0 failed")
+
+    def stop(share: float, text: str) -> None:
+        raise RuntimeError(f"{share}: {text}")
+
+    with pytest.raises(RuntimeError, match=r"of 4 cells done"):
+        sweep.run(SAID, progress=stop)
+
+
 def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
     with pytest.raises(InputError, match=r"^start point off the ellipsoid at x0=20"):
         sweep.trajectory(SAID, at={"x0": 20})

@@ -111,7 +111,8 @@ def _source(config: ConfigLike) -> document.Document:
     if isinstance(config, Mapping):
         return document.Document("", plain_data(config))
     if not isinstance(config, Config):
-        return document.read(local_path(config))
+        wanted = "the path of a YAML file, a mapping with its contents, or a Config"
+        return document.read(local_path(config, "config", wanted))
     if config.source:
         return deepcopy(config.source)
     values = config.document()

@@ -95,7 +95,7 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
         if the file does not exist, or has no time or data column, an unknown unit, decreasing times, too few rows, or
         text instead of numbers.
     """
-    table = tables.read(str(path), text_of(local_path(path)))
+    table = tables.read(str(path), text_of(local_path(path, "film", "a Film or the path of a table")))
     found, asked = _columns(table), _asked(table, time_column, spin_column)
     if spin_column:
         found = {name: place for name, place in found.items() if name not in get_args(Seen)}

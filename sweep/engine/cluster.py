@@ -19,7 +19,7 @@ import numba
 from sweep.config import Config
 from sweep.engine.local import Done, run_batch, split
 from sweep.engine.plan import kernels
-from sweep.faults import FileError
+from sweep.faults import FileError, fault_of, refusal
 from sweep.grid import Tile
 from sweep.interrupt import point
 from sweep.kernels.build import APPROACH, build
@@ -114,16 +114,32 @@ def _work(shared: Shared, batch: Sequence[int]) -> list[Done]:
         return list(run_batch(config, tiles, batch))
 
 
+def _require_usable(client: object) -> None:
+    """Raise an `InputError` unless `client` is an open client that waits for results."""
+    from distributed import Client
+
+    if not isinstance(client, Client):
+        raise fault_of(refusal(client, "a distributed.Client or the address of a scheduler"), "client")
+    if client.asynchronous:
+        raise fault_of("is asynchronous; give one that was made with asynchronous=False", "client")
+    if client.status != "running":
+        raise fault_of(f"is {client.status}; give a client that is connected to its scheduler", "client")
+
+
 @contextmanager
 def connected(client: Client | str | None) -> Iterator[Client | None]:
     """Connect to the scheduler at an address; a client, or None, is returned unchanged.
 
     Raises
     ------
+    InputError
+        if it is something else, or a client that is closed or asynchronous.
     FileError
         if no scheduler answers, or distributed is not installed.
     """
     if not isinstance(client, str):
+        if client is not None:
+            _require_usable(client)
         yield client
         return
     try:

@@ -1,10 +1,9 @@
 """Compile the pieces of kernels into the cache, side by side, each in its own process.
 
-    python -m sweep.kernels.build PIECE METHOD MODEL [MEASURE …]
-
-A PIECE is `kernel`, or another part that runs need: `images` and `endings`, `path` for single trajectories, `approach`
-once a trajectory has failed, and `exchange` and `follow` for foreseen counts.  For a user's model, MODEL is
-"name@digest", and the record of its origin comes as a line of standard input.
+The arguments of such a process are PIECE METHOD MODEL [MEASURE …]. A PIECE is `kernel`, or another part that runs need:
+`images` and `endings`, `path` for single trajectories, `approach` once a trajectory has failed, and `exchange` and
+`follow` for foreseen counts. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line
+of standard input.
 
 Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
 functions that a kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of
@@ -23,6 +22,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
+from pathlib import Path
 
 from sweep.faults import CompileError
 from sweep.interrupt import point
@@ -150,9 +150,24 @@ def _compile(jobs: list[Job]) -> None:
             running = [process for process in running if process.returncode is None]
 
 
+_BEGIN = f"""
+import sys
+from importlib.machinery import PathFinder
+from importlib.util import module_from_spec
+
+spec = PathFinder.find_spec("sweep", sys.argv[1:2])
+sys.modules["sweep"] = module_from_spec(spec)
+spec.loader.exec_module(sys.modules["sweep"])
+from {__name__} import main
+
+main(*sys.argv[2:])
+"""
+"""The program of such a process. With -P it imports nothing from the current folder, but this package from anywhere."""
+
+
 def _start(job: tuple[str, ...], origin: Origin | None) -> subprocess.Popen[bytes]:
     # Nothing else is ever written to stdin: it closes when this process ends, however it ends.
-    command = [sys.executable, "-m", __name__, *job]
+    command = [sys.executable, "-P", "-c", _BEGIN, str(Path(__file__).parents[2]), *job]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     if origin and process.stdin:
         with suppress(BrokenPipeError):  # it has failed: its piece stays missing
@@ -183,7 +198,3 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
             raise
         print(json.dumps([error.places, error.reason]), flush=True)
         os._exit(_DOES_NOT_COMPILE)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

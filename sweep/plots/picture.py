@@ -122,7 +122,7 @@ def plot(
     >>> sweep.plot(maps, width="85mm", output="column.pdf").get_size_inches()[0] * 25.4
     np.float64(85.0)
     """
-    if output is not None and suffix(Path(output)) not in PICTURES:
+    if output is not None and suffix(local_path(output)) not in PICTURES:
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
     limits = _pair(limits, "limits", "a lower and a higher finite number, such as (0, 5)", lambda low, high: low < high)
     if limits is not None and max(map(abs, limits)) > scales.LARGEST:
@@ -166,7 +166,9 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
         if source.name not in {*VARIABLES, *DERIVED}:
             raise fault_of(f"{source.name or 'an array without a name'} is not a variable of a run; pass the dataset")
         return source.to_dataset().assign_attrs({ATTRIBUTE: RUN.name})
-    return source if isinstance(source, xr.Dataset) else open_dataset(local_path(source))
+    if isinstance(source, xr.Dataset):
+        return source
+    return open_dataset(local_path(source, "dataset", "a dataset or the path of its file"))
 
 
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:

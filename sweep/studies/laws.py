@@ -17,7 +17,7 @@ import xarray as xr
 from sweep.config import Config, load_config
 from sweep.config.film import Film, read
 from sweep.engine.reporter import Reporter
-from sweep.faults import brief, fault_of, suggestion
+from sweep.faults import brief, fault_of, refusal, suggestion
 from sweep.models.general.laws import LAWS, Law
 from sweep.studies.fit import fit, with_optional
 from sweep.studies.ranges import wide
@@ -36,12 +36,13 @@ _SHARED = ("seen", "other", "minimum", "misfit", "correlation")
 def fitted(
     config: Config,
     film: str | Path | Film,
-    free: Sequence[str],
-    laws: Sequence[str],
+    free: str | Sequence[str],
+    laws: str | Sequence[str],
     reporter: Reporter,
     columns: tuple[str, str] = ("", ""),
 ) -> xr.Dataset:
     """Fit as `sweep.api.fit`; `columns` names the time and data columns."""
+    free, laws = _names(free, "free"), _names(laws, "laws")
     if laws and (config.origin or config.model != "slip"):
         raise fault_of("laws of friction can be compared only in the slip model; set model: slip")
     for name in laws:
@@ -60,6 +61,14 @@ def fitted(
         note(f"law {name}: free are {', '.join(names)}" + (f"; it has no {', '.join(dropped)}" if dropped else ""))
         found[name] = fit(other, film, names, note, compared=True)
     return _together(found, film)
+
+
+def _names(given: str | Sequence[str], argument: str) -> Sequence[str]:
+    """Return the names that an argument gives, a single one or several."""
+    names = [given] if isinstance(given, str) else given
+    if not (isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)):
+        raise fault_of(refusal(given, "a name or a list of names"), argument)
+    return names
 
 
 def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:

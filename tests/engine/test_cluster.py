@@ -1,5 +1,6 @@
 """Runs in other processes: the same files as by threads, whatever happens to the workers."""
 
+import asyncio
 import os
 import signal
 import subprocess
@@ -251,6 +252,20 @@ def test_a_run_that_lost_its_scheduler_computes_what_is_missing_on_another(
     sweep.run(config, out, client=client)
     assert completed(local) == TILES - there < TILES
     assert contents(out) == by_threads
+
+
+def test_a_client_that_cannot_be_used_is_refused(config: Path, local: distributed.LocalCluster) -> None:
+    closed = distributed.Client(local, set_as_default=False)
+    closed.close()
+    with pytest.raises(sweep.InputError, match=r"^client: is closed; give a client that is connected"):
+        sweep.run(config, client=closed)
+
+    async def asynchronous() -> None:
+        async with distributed.Client(local.scheduler_address, asynchronous=True, set_as_default=False) as client:
+            with pytest.raises(sweep.InputError, match=r"^client: is asynchronous; give one that was made with"):
+                sweep.run(config, client=client)
+
+    asyncio.run(asynchronous())
 
 
 def test_formulas_run_on_a_cluster(config: Path, client: distributed.Client) -> None:

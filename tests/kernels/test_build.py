@@ -43,6 +43,18 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
     return pieces
 
 
+def test_a_process_imports_nothing_from_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And finds this package wherever it is; `random` is imported by Numba."""
+    (tmp_path / "random.py").write_text("open('imported', 'w').close()\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    with builder._start(("follow", "dopri5", "slip"), None) as process:
+        process.wait(300)
+    assert process.returncode == 0
+    assert not (tmp_path / "imported").exists()
+    assert [*(tmp_path / "cache").rglob("*.nbc")]
+
+
 def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...]]) -> None:
     measure = ("reversals", "resting_spin")
     build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
