@@ -20,7 +20,6 @@ from support.runs import same_numbers
 import sweep
 from sweep.axis import Axis
 from sweep.config import InputError, load_config
-from sweep.plots.fine import critical_spins
 
 TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
 SAID: dict[str, Any] = YAML(typ="safe").load(TEXT)
@@ -288,7 +287,6 @@ def test_what_a_dataset_tells_has_to_be_a_configuration(text: str) -> None:
     dataset.attrs["config"] = text
     with pytest.raises(InputError, match="config"):
         dataset.sweep.trajectory()
-    assert not critical_spins(dataset, Axis("mu", dataset.mu.values), Axis("b", dataset.b.values))
 
 
 def test_a_dataset_does_not_run_the_code_of_another(tmp_path: Path) -> None:

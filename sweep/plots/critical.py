@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.lines import Line2D
 
 from sweep.axis import Axis
-from sweep.plots import fine, labels, theory
+from sweep.plots import labels, theory
 from sweep.plots.description import along
 from sweep.plots.figure import Picture, framed, set_scale, write_words, zero_line
 from sweep.plots.panels import MAX_PANELS, check, indices
@@ -42,20 +42,14 @@ def draw(dataset: xr.Dataset) -> Picture:
         chosen = chosen.sortby(x) if x else chosen
         at = along(chosen, x)
         set_scale(axes, "x", at)
-        between = fine.critical_spins(chosen, Axis(x, at)) if x else {}
-        there = _found(chosen, styles)
         for variable in filter(chosen.__contains__, styles):
-            values, places = chosen[variable], at
-            if variable in there & {*between} and x in between[variable].coords:
-                # Rows of a table have no values in between.
-                values, places = between[variable], between[variable][x].values
-            if len(places) == 1 and "marker" not in styles[variable]:
-                places = Axis(x, at).edges  # a line of one point would be invisible
-            for _, spins in theory.by_sign(values):
+            alone = len(at) == 1 and "marker" not in styles[variable]
+            places = Axis(x, at).edges if alone else at  # a line of one point would be invisible
+            for _, spins in theory.by_sign(chosen[variable]):
                 axes.plot(places, np.broadcast_to(spins.values, places.shape), gid=variable, **styles[variable])
         zero_line(axes)
         axes.tick_params(bottom=bool(x), labelbottom=bool(x) and axes.xaxis.get_tick_params()["labelbottom"])
-        if not there:
+        if not _found(chosen, styles):
             write_words(axes, _why_none(chosen))
         axes.set_ylabel(labels.with_unit("spin n", labels.unit(dataset, min(shown)) if shown else ""))
     names = {f"{theory.WORDS[name]} beyond {name}": colour for name, colour in _COLOURS.items()

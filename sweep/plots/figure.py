@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from io import BytesIO
-from math import log
+from math import ceil, log
 from string import ascii_lowercase
 from textwrap import fill
 from typing import Any, Literal
-from warnings import catch_warnings, simplefilter
 
 import matplotlib as mpl
 import numpy as np
@@ -17,14 +16,12 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
-from matplotlib.collections import Collection
-from matplotlib.colors import to_rgb, to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.axis import Axis
+from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.panels import MAX_PANELS, Panel, title
@@ -42,7 +39,7 @@ _STYLE: dict[Any, Any] = {
     "font.size": TEXT, "axes.titlesize": "medium", "xtick.labelsize": "small", "ytick.labelsize": "small",
     "legend.fontsize": "small", "legend.title_fontsize": "small", "hatch.linewidth": 0.7,
     "axes.formatter.limits": [-4, 6], "axes.formatter.use_mathtext": True,
-    "figure.dpi": 110, "pdf.fonttype": 42, "ps.fonttype": 42, "svg.hashsalt": "sweep",
+    "figure.dpi": 110, "pdf.fonttype": 42, "svg.hashsalt": "sweep",
 }  # fmt: skip
 """Settings of matplotlib that the user has not changed."""
 
@@ -64,31 +61,24 @@ _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 _UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
 """Patterns kept on one line: the unit at the end of a label, a value; a constant with its unit."""
 
-_HIGHER = (1.25, 1.6, 2.0, 2.5)
-"""Factors by which a figure of given width may become higher."""
-
-_SPARE = 0.97
-"""Share of the size that must be enough, because the layout differs slightly from one drawing to the next."""
-
 _LEAST = 1.2
 """Smallest width of a map in inches."""
 
 _COLUMN, _OF_COLUMN = 6.0, 3
 """Largest width in inches of a column of text, and the largest number of panels in a row there."""
 
-_NARROWEST = 0.1
-"""Width in inches of a panel on a page without room; the figure is refused after drawing."""
+_NARROWEST = 0.25
+"""Smallest width of a panel in inches, for which a page must have room."""
 
 
-def style(width: float | None, *, printed: bool) -> dict[Any, Any]:
-    """The settings of matplotlib for a figure: ours, except where the user has changed matplotlib's.
+def style(width: float | None) -> dict[Any, Any]:
+    """Return the settings of matplotlib for a figure: ours, except where the user has changed matplotlib's.
 
     Parameters
     ----------
-    width : width of the figure in inches; None for the user's setting, or for a screen
-    printed : whether it is for print
+    width : width in inches of a figure for print; None for the user's setting, or for a screen
     """
-    ours = _STYLE | (_PRINT if printed else {})
+    ours = _STYLE | (_PRINT if width else {})
     unchanged = {name: v for name, v in ours.items() if mpl.rcParams[name] == mpl.rcParamsDefault[name]}
     # The panels set the height; this one only keeps the size from being taken for matplotlib's default.
     return unchanged | ({"figure.figsize": [width, width / 2]} if width else {})
@@ -109,12 +99,14 @@ class Picture(Figure):
 
     def __init__(self, dataset: xr.Dataset, width: float, height: float, *, constants: bool = True) -> None:
         scale = mpl.rcParams["font.size"] / TEXT
+        words = fill(dataset.attrs.get("title", ""), max(1, int(width / _OF_TITLE)))
+        height += _LINE * words.count("\n")
         super().__init__((width * scale, height * scale), layout="constrained")
         self._width, self._height = width, height
         self._constants = constants_in_lines(labels.constants(dataset), width) if constants else ""
         self._style: dict[Any, Any] = {name: mpl.rcParams[name] for name in _STYLE}
-        if title := dataset.attrs.get("title", ""):
-            self.suptitle(fill(title, max(1, int(width / _OF_TITLE))))
+        if words:
+            self.suptitle(words)
 
     def draw(self, renderer: RendererBase) -> None:
         with mpl.rc_context(self._style):
@@ -181,31 +173,6 @@ class Picture(Figure):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
-    def has_room(self, *, taller: bool) -> bool:
-        """Return whether the panels have room, if need be after making the figure taller."""
-        wide, high = self.get_size_inches()
-        if wide > 1.001 * mpl.rcParams["figure.figsize"][0]:  # its panels had to be wider than the page
-            return False
-        if self._holds(wide, high):
-            return True
-        # If the highest figure has no room, a lower one has none either.
-        if not taller or not self._holds(wide, _HIGHER[-1] * high):
-            return False
-        return any(self._holds(wide, factor * high) for factor in _HIGHER)
-
-    def _holds(self, wide: float, high: float) -> bool:
-        """Resize the figure, in inches, and return whether its panels have room."""
-        with catch_warnings():
-            simplefilter("error")
-            try:
-                for share in (_SPARE, 1.0):
-                    self.set_size_inches(share * wide, share * high)
-                    self.draw_without_rendering()
-            except UserWarning:  # of constrained_layout
-                return False
-        return True
-
-
 def _columns(entries: list[str], width: float) -> list[list[str]]:
     """Share the entries of a legend among as many columns as fit in this width in inches, as matplotlib does."""
     for count in range(len(entries), 0, -1):
@@ -214,30 +181,6 @@ def _columns(entries: list[str], width: float) -> list[list[str]]:
         if sum(longest) * _LETTER + count * _HANDLE <= width:
             return columns
     return [entries]
-
-
-def opaque(figure: Figure) -> None:
-    """Mix all transparent colours with the background, for a format without transparency."""
-    figure.draw_without_rendering()  # which makes the ticks
-    ground = np.array(to_rgb(figure.get_facecolor()))
-
-    def mixed(colours: Any) -> Array:
-        rgba = to_rgba_array(colours)
-        alpha = np.where(rgba[:, 3:] > 0, rgba[:, 3:], 1.0)  # invisible parts stay invisible
-        return np.hstack([alpha * rgba[:, :3] + (1 - alpha) * ground, np.ceil(rgba[:, 3:])])
-
-    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
-        if alpha := axis.get_tick_params().get("grid_alpha"):  # another resolution may make further ticks
-            axis.set_tick_params(grid_color=mixed(to_rgba(mpl.rcParams["grid.color"], alpha))[0], grid_alpha=1.0)
-    for artist in figure.findobj(lambda each: isinstance(each, Line2D | Patch | Collection)):
-        found: Any = artist
-        if isinstance(found, Line2D):
-            colour = mixed(to_rgba(found.get_color(), found.get_alpha()))[0]
-            found.set(alpha=None, color=colour)
-        elif getattr(found, "get_array", lambda: None)() is None:  # except parts coloured by a colour map
-            one = isinstance(found, Patch)
-            face, edge = (mixed(each) for each in (found.get_facecolor(), found.get_edgecolor()))
-            found.set(alpha=None, facecolor=face[0] if one else face, edgecolor=edge[0] if one else edge)
 
 
 def constants_in_lines(constants: str, width: float) -> str:
@@ -285,8 +228,16 @@ def panel_width(columns: int, widest: float, around: float) -> float:
     ----------
     widest : width of a panel, at most, on a page whose size is not given
     around : inches across of labels and bars around the panels
+
+    Raises
+    ------
+    InputError
+        if the page is too narrow; the message gives a width that suffices.
     """
-    width = max((page() - around) / columns, _NARROWEST)
+    width = (page() - around) / columns
+    if width < _NARROWEST:
+        needed = ceil(25.4 * (around + columns * _NARROWEST) * mpl.rcParams["font.size"] / TEXT)
+        raise fault_of(f"too narrow for this figure; give {needed}mm or more, or choose a smaller text", "width")
     return width if is_asked() else min(width, widest)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-PICTURES = ("png", "pdf", "svg", "eps")
-A_PICTURE = "png, pdf, svg or eps"
+PICTURES = ("png", "pdf", "svg")
+A_PICTURE = "png, pdf or svg"
 """`PICTURES` in words, for messages."""
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from bisect import bisect_left
 from collections.abc import Callable, Mapping
-from functools import partial
-from math import ceil, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any, cast
+from warnings import catch_warnings, filterwarnings
 
 import matplotlib as mpl
 import xarray as xr
@@ -28,7 +26,7 @@ from sweep.plots import (
     scales,
     trajectories,
 )
-from sweep.plots.figure import Picture, framed, is_asked, is_column, opaque, style
+from sweep.plots.figure import Picture, framed, is_column, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
@@ -54,9 +52,6 @@ _NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"D
 _NARROWEST, _WIDEST = 0.05, 1.0
 """Largest width of a figure in metres."""
 
-_GROWTH = 1.15
-"""Factor between sizes in the search for one that has room."""
-
 _OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
     TRAJECTORY: trajectories.draw,
     CRITICAL: critical.draw,
@@ -76,7 +71,6 @@ def plot(
     limits: Limits | None = None,
     cmap: str | None = None,
     width: str | None = None,
-    figsize: tuple[float, float] | None = None,
     title: str | None = None,
     ax: Axes | None = None,
     output: str | Path | None = None,
@@ -97,11 +91,10 @@ def plot(
     cmap : name of a colour map of matplotlib
     width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, except subscripts,
         and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
-        that was changed
-    figsize : width and height in inches, by default as high as the panels need; not together with `width`
+        that was changed.  The height follows from the panels
     title : of the figure, "" for none; by default that of the dataset
     ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
-    output : file to write; its suffix names the format: png, pdf, svg or eps
+    output : file to write; its suffix names the format: png, pdf or svg
 
     Returns
     -------
@@ -112,7 +105,7 @@ def plot(
     ------
     InputError
         if the dataset has no such variable or axis, would need too many panels, or there is no such format or width; if
-        the size is too small.  With `ax`, if there are several panels.
+        `output` is so narrow that the panels have no room.  With `ax`, if there are several panels.
     FileError
         if the file is not a dataset, if the dataset has lost what its figure needs, or `output` cannot be written.
 
@@ -127,14 +120,8 @@ def plot(
     limits = _pair(limits, "limits", "a lower and a higher finite number, such as (0, 5)", lambda low, high: low < high)
     if limits is not None and max(map(abs, limits)) > scales.LARGEST:
         raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {scales.LARGEST:g}", "limits")
-    figsize = _pair(figsize, "figsize", "a width and a height in inches, such as (6, 4)", lambda *both: min(both) > 0)
-    if figsize is not None and width is not None:
-        raise fault_of("also sets the width; give either width or figsize", "figsize")
-    if figsize is not None and max(figsize) > (most := _WIDEST / 0.0254):
-        raise fault_of(f"{figsize[0]:g} × {figsize[1]:g} inches; give at most {most:.3g} inches", "figsize")
-    for option, size in (("width", width), ("figsize", figsize)):
-        if ax is not None and size is not None:
-            raise fault_of("the given axes have their own size; leave it out", option)
+    if ax is not None and width is not None:
+        raise fault_of("the given axes have their own size; leave it out", "width")
     if at is not None and not isinstance(at, Mapping):
         raise fault_of(refusal(at, "values by axis, such as {'n0': 0.05}"), "at")
     if title is not None and not isinstance(title, str):
@@ -149,12 +136,14 @@ def plot(
         _draw_in(ax, opened, variable, axes, how)
         figure = cast(Figure, ax.get_figure(root=True))
     else:
-        figure = _of_size(
-            partial(_drawn, opened, variable, axes, how),
-            figsize,
-            inches(width) if width is not None else None,
-            title,
-        )
+        across = inches(width) if width is not None else None
+        with mpl.rc_context(style(across)):
+            drawn = _drawn(opened, variable, axes, how)
+            if across:
+                drawn.letter()
+            if title is not None:
+                drawn.suptitle(title)
+        figure = drawn
     if output is not None:
         save(figure, local_path(output))
     return figure
@@ -189,46 +178,6 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
     figure, frames = framed(chosen.dataset, chosen.each, next(iter(chosen.across), ""))
     figure.explain(curves.draw(chosen, frames, how["limits"]))
     return figure
-
-
-def _of_size(
-    draw: Callable[[], Picture], size: tuple[float, float] | None, across: float | None, title: str | None
-) -> Picture:
-    """Draw a figure of a given size, or of a given width for print, in inches.
-
-    Raises
-    ------
-    InputError
-        if the size is too small; the message gives one that suffices.
-    """
-
-    def of(scale: float) -> tuple[Picture, bool]:
-        """The figure in this scale, and whether it has room."""
-        wide = size[0] if size else across
-        with mpl.rc_context(style(wide and wide * scale, printed=size is None and across is not None)):
-            figure = draw()
-            if across:
-                figure.letter()
-            if size:
-                figure.set_size_inches(scale * size[0], scale * size[1])
-            if title is not None:
-                figure.suptitle(title)
-            return figure, not is_asked() or figure.has_room(taller=size is None)
-
-    figure, room = of(1.0)
-    if room:
-        return figure
-    enough = 1
-    while not of(_GROWTH**enough)[1]:
-        enough *= 2
-    scale = _GROWTH ** bisect_left(range(enough), True, enough // 2 + 1, key=lambda k: of(_GROWTH**k)[1])
-    wide = across or float(mpl.rcParams["figure.figsize"][0])
-    given, needed = (
-        f"{size[0] * by:.3g} × {size[1] * by:.3g} inches" if size else f"{ceil(wide * by * 25.4 - 1e-6)}mm"
-        for by in (1, scale)
-    )
-    words = f"{given} is too small for this figure; give {needed}, or choose a smaller text"
-    raise fault_of(words, "figsize" if size else "width" if across else "figure.figsize")
 
 
 def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> None:
@@ -278,10 +227,11 @@ def inches(width: str) -> float:
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format that the suffix names; the same figure gives the same bytes."""
     form = suffix(path)
-    if form == "eps":
-        opaque(figure)
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, catch_warnings():
+        filterwarnings("error", "constrained_layout not applied")
         dpi = figure.dpi * (1 if form == "png" else 2)
-        figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))
-        if form == "eps":
-            temporary.write_bytes(re.sub(rb"%%(CreationDate|Title): .*\n", b"", temporary.read_bytes()))
+        try:
+            figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))
+        except UserWarning:
+            words = "its words leave no room for the panels; give a larger width, or choose a smaller text"
+            raise fault_of(words, "width") from None

@@ -15,7 +15,6 @@ import xarray as xr
 from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
-from sweep.plots import fine
 
 REVERSALS = ("reversals", "reversals_foreseen", "reversals_predicted", "difference")
 """The variables that theory explains."""
@@ -110,16 +109,11 @@ def crossings(dataset: xr.Dataset, x: Axis) -> list[Line]:
 
 
 def _explaining(dataset: xr.Dataset, *axes: Axis) -> Iterator[tuple[str, str, xr.DataArray, str]]:
-    """Yield name, symbol, values and source of the critical spins that depend on these axes alone.
-
-    Values between the cells are computed where possible.
-    """
+    """Yield name, symbol, values and source of the critical spins that depend on these axes alone."""
     across = {axis.name for axis in axes}
     if "n0" not in dataset.coords or not set(dataset["n0"].dims) <= across & {"n0"}:
         return
-    between = fine.critical_spins(dataset, *axes)
     known = {name: values for name, values in dataset.data_vars.items() if {*values.dims} <= {*across, "sign"}}
-    known |= {name: values for name, values in between.items() if name in known}
     for name in _SOURCES:
         for sign, values, source in critical_spins(known, name):
             yield name, sign, values, source

@@ -45,7 +45,7 @@ VALUES: dict[str, tuple[Any, ...]] = {
     "x": AXES, "y": AXES, "variable": (*VARIABLES, *DERIVED),
     "at": ({"n0": 0.05}, {"mu": 60}, {"b": 3}, {"case": 0}),
     "title": ("", "A title", "μ & $"), "limits": ((0, 5), (-1, 1), (1, 0), (0, 1e7)),
-    "cmap": ("viridis", "no"), "width": ("85mm", "50mm", "3in"), "figsize": ((4, 3), (8, 8), (1, 1)),
+    "cmap": ("viridis", "no"), "width": ("85mm", "50mm", "3in"),
     "bracket": (0.01, 0.1, 0.5), "deviation": (0.01, 0.1), "every": (0.5, 5.0, 1e3), "samples": (1, 2),
     "speed": (1.0, 10.0), "laws": ((), ("viscous",)),
 }  # fmt: skip

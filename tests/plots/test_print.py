@@ -7,11 +7,13 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib import layout_engine
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from support.cli import invoke, refused
 from support.figures import entries, made
 
+from sweep.faults import InputError
 from sweep.kernels.status import DIVERGED, IMPOSSIBLE, LIFT_OFF, TIME_LIMIT
 from sweep.plots import picture
 from sweep.results.netcdf import open_dataset, write
@@ -103,15 +105,42 @@ def test_a_wide_figure_compares_maps_side_by_side() -> None:
     assert [axes.get_subplotspec().colspan.start for axes in panels] == [0, 1, 2]
 
 
-@pytest.mark.parametrize("suffix", ["pdf", "eps"])
-def test_fonts_can_be_edited(tmp_path: Path, suffix: str) -> None:
-    picture.plot(made(), "reversals", output=tmp_path / f"a.{suffix}")
-    picture.plot(made(), "reversals", width="85mm").savefig(tmp_path / f"b.{suffix}")
+@pytest.mark.parametrize("width", [None, "85mm", "180mm"])
+def test_a_figure_is_laid_out_once(width: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    layouts, lay_out = list[Figure](), layout_engine.do_constrained_layout
+    monkeypatch.setattr(
+        layout_engine, "do_constrained_layout", lambda figure, **how: layouts.append(figure) or lay_out(figure, **how)
+    )
+    figure = picture.plot(made(), width=width, output=tmp_path / "one.png")
+    assert layouts == [figure]
+
+
+def test_a_width_without_room_is_refused_with_one_that_has(tmp_path: Path) -> None:
+    with mpl.rc_context({"font.size": 16}):
+        with pytest.raises(InputError, match="^width: too narrow for this figure; give ") as refused:
+            picture.plot(made(), width="50mm")
+        given = str(refused.value).split("give ")[1].split(" ")[0]
+        assert picture.plot(made(), width=given).get_figwidth() * 25.4 == pytest.approx(float(given.removesuffix("mm")))
+    wordy = made().assign(spin_final=lambda one: one.spin_final.assign_attrs(long_name="spin at the end " * 99))
+    with pytest.raises(InputError, match="^width: its words leave no room for the panels; give a larger width"):
+        picture.plot(wordy, "spin_final", width="85mm", output=tmp_path / "wordy.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_long_title_takes_no_room_from_the_panels() -> None:
+    short, long = (picture.plot(made().assign_attrs(title="a run " * n), width="85mm") for n in (1, 60))
+    for figure in (short, long):
+        figure.draw_without_rendering()
+    assert long.axes[0].bbox.height > 0.9 * short.axes[0].bbox.height
+
+
+def test_fonts_can_be_edited(tmp_path: Path) -> None:
+    picture.plot(made(), "reversals", output=tmp_path / "a.pdf")
+    picture.plot(made(), "reversals", width="85mm").savefig(tmp_path / "b.pdf")
     for name in "ab":
-        written = (tmp_path / f"{name}.{suffix}").read_bytes()
-        assert b"/FontType 42" in written if suffix == "eps" else b"/CIDFontType2" in written
+        written = (tmp_path / f"{name}.pdf").read_bytes()
+        assert b"/CIDFontType2" in written
         assert b"/Type3" not in written
-        assert b"/FontType 3" not in written
 
 
 @pytest.mark.parametrize("width", ["85", "85 apples", "3 kg", "-85mm", "1mm", "5m", "", "8**9mm"])
@@ -143,12 +172,6 @@ def test_settings_of_the_user_are_obeyed() -> None:
     assert {tick.get_fontsize() for tick in axes.get_xticklabels()} == {11}
     assert figure.get_figwidth() == pytest.approx(7)
     assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]
-
-
-def test_a_figure_has_the_size_that_is_asked_for(small: xr.Dataset) -> None:
-    np.testing.assert_allclose(picture.plot(small, figsize=(6, 9)).get_size_inches(), (6, 9))
-    usual, other = (picture.plot(made(), figsize=(6.4, height)) for height in (4.8, 5))  # matplotlib's own is 6.4 × 4.8
-    assert [axes.get_title() for axes in usual.axes] == [axes.get_title() for axes in other.axes]
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,10 @@
 """Pictures of datasets that have lost something or have one value or none, and sizes and limits at the edge."""
 
-import logging
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,7 +17,6 @@ from sweep.config import InputError
 from sweep.faults import FileError
 from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
-from sweep.plots.figure import opaque
 from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.kind import SPINS
 from sweep.results.margins import POINTS
@@ -199,29 +196,6 @@ def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None
     assert axes.get_title() == "no boundary was found between the cells"
 
 
-@pytest.mark.parametrize("size", [{"figsize": (1, 1)}, {"figsize": (2.5, 1)}, {"width": "50mm"}])
-def test_a_size_without_room_is_refused_with_one_that_has(size: dict[str, Any]) -> None:
-    style: Any = {"font.size": 14, "axes.titlesize": 20}
-    with mpl.rc_context(style):
-        with pytest.raises(InputError, match=f"^{next(iter(size))}: .* is too small for this figure; give ") as refused:
-            picture.plot(made(), **size)
-        given = str(refused.value).split("give ")[1].split(",")[0]
-        figsize = tuple(map(float, given.removesuffix(" inches").split(" × "))) if "figsize" in size else None
-        fitting = {"figsize": figsize} if figsize else {"width": given}
-        picture.plot(made(), **fitting).draw_without_rendering()  # without a warning
-
-
-def test_eps_is_opaque(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Matplotlib logs transparent colours, which EPS does not support, and draws them in full strength."""
-    dataset = made()
-    dataset["status"][:] = TOPPLED
-    dataset["status"][:, :4] = 2
-    with caplog.at_level(logging.WARNING, "matplotlib"):
-        for name, each in {"map": dataset, "curves": made().isel(b=0), "samples": sampled()}.items():
-            picture.plot(each, output=tmp_path / f"{name}.eps")
-    assert not caplog.records
-
-
 def test_labels_of_bars_stay_in_the_figure() -> None:
     """The label of a bar is broken as those of axes are."""
     long = "spin that is left " * 9
@@ -232,15 +206,3 @@ def test_labels_of_bars_stay_in_the_figure() -> None:
     assert figure.axes[-1].get_label() == "<colorbar>"
     assert box.y0 >= 0
     assert box.y1 <= figure.bbox.y1
-
-
-def test_ticks_that_are_made_later_are_opaque_too() -> None:
-    """Another resolution gives the panels another size, and that another number of ticks."""
-    drawn = Figure()
-    axes = drawn.add_subplot()
-    axes.grid(alpha=0.3)
-    axes.set_xticks([])
-    opaque(drawn)
-    axes.set_xticks(np.linspace(0, 1, 30))
-    drawn.draw_without_rendering()
-    assert {line.get_alpha() for line in axes.get_xgridlines()} <= {None, 1.0}
