@@ -18,7 +18,6 @@ from support import Write
 from support.runs import same_numbers
 
 import sweep
-from sweep.axis import Axis
 from sweep.config import InputError, load_config
 
 TEXT = "name: quick\nmodel: averaged\nbody: {b: [2, 3]}\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"

@@ -99,11 +99,3 @@ announce = partial(say, err=True)
 """Print a note on stderr even with --quiet: user code never runs unannounced."""
 
 
-def parse_span(text: str, option: str) -> tuple[float, float]:
-    from sweep.config.document import number
-
-    low, dots, high = text.partition("..")
-    ends = number(low), number(high)
-    if not dots or ends[0] is None or ends[1] is None or not ends[0] < ends[1]:
-        refuse(f"{option} {brief(text)}", "must be LOW..HIGH, two numbers, the lower one first")
-    return ends[0], ends[1]

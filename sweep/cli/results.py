@@ -11,7 +11,7 @@ import click
 
 from sweep import interrupt
 from sweep.cli.faults import DONE, refuse, say
-from sweep.cli.options import FILE, PATH, announce, named_values, parse_span
+from sweep.cli.options import FILE, PATH, announce, named_values
 from sweep.plots import formats
 
 
@@ -22,7 +22,8 @@ from sweep.plots import formats
 @click.option("--x", help="Parameter along the horizontal axis.")
 @click.option("--y", help="Parameter along the vertical axis.")
 @named_values("--at", "at", "Draw only the cells nearest to this value of an axis, e.g. n0=0.05")
-@click.option("--limits", metavar="LOW..HIGH", help="Lowest and highest value of the colour scale.")
+@click.option("--vmin", type=float, help="Lowest value of the colour scale [default: that of the cells drawn].")
+@click.option("--vmax", type=float, help="Highest value of the colour scale [default: that of the cells drawn].")
 @click.option("--cmap", metavar="NAME", help="A matplotlib colour map, such as viridis.")
 @click.option("--width", metavar="LENGTH",
               help="Width of a figure for print, such as 85mm, with text of 6 points or more.")  # fmt: skip
@@ -30,17 +31,16 @@ from sweep.plots import formats
 @click.option("--output", type=PATH, help=f"Picture to write; its suffix names the format: {formats.A_PICTURE} "
               "[default: a PNG beside FILE, named after FILE and the options].")  # fmt: skip
 def plot(
-    file: Path, variable: str | None, at: dict[str, Any], limits: str | None, title: str | None, output: Path | None,
-    **how: Any,
-) -> None:  # fmt: skip
+    file: Path, variable: str | None, at: dict[str, Any], title: str | None, output: Path | None, **how: Any
+) -> None:
     """Draw maps, curves, trajectories, critical spins or boundaries."""
-    span = parse_span(limits, "--limits") if limits is not None else None
     from sweep.plots import panels, picture
     from sweep.results.kind import opened
 
     interrupt.raise_again()
     # The picture drawn without options belongs to the run; any other gets its own name.
-    asked = [f"{name}={value}" for name, value in {**how, "limits": limits}.items() if value]
+    given = {name: f"{value:g}" if isinstance(value, float) else value for name, value in how.items()}
+    asked = [f"{name}={value}" for name, value in given.items() if value]
     parts = [
         file.stem,
         variable,
@@ -50,7 +50,7 @@ def plot(
     ]
     target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
     dataset = opened(file)
-    picture.plot(dataset, variable, at=at, limits=span, title=title, output=target, **how)
+    picture.plot(dataset, variable, at=at, title=title, output=target, **how)
     for name, i in panels.nearest(dataset, at).items():
         taken = float(dataset[name][i])
         say(f"{name} = {taken:g}" + (f", nearest to {at[name]:g}" if taken != at[name] else ""))

@@ -20,7 +20,7 @@ from sweep.plots.figure import Frames, set_scale, write_words
 from sweep.plots.marks import BLANK, legend
 from sweep.plots.panels import Panels, title
 from sweep.plots.quantities import COMPARISONS
-from sweep.plots.scales import Limits
+from sweep.plots.scales import AUTO, Limits, ends
 from sweep.results.probabilities import interval, sound
 
 _STYLES: dict[str, dict[str, Any]] = {
@@ -45,7 +45,7 @@ _COLOURS = 0.85
 """Part of the colour map used for probabilities: its last colours are too light for lines."""
 
 
-def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[Artist]:
+def draw(panels: Panels, frames: Frames, limits: Limits = AUTO) -> list[Artist]:
     """Draw the variables over one axis, in a panel for each value of the others; returns legend entries."""
     if panels.names == ["probability"]:
         return _probabilities(panels, frames, limits)
@@ -56,8 +56,8 @@ def draw(panels: Panels, frames: Frames, limits: Limits | None = None) -> list[A
     for axes, chosen in frames:
         entries |= _panel(axes, chosen, names, x, kinds)
         axes.set_ylabel(labels.common(dataset, names[0]))
-        if limits:
-            axes.set_ylim(limits)
+        if limits != AUTO:
+            axes.set_ylim(ends(limits, *axes.get_ylim()))
     return list(entries.values())
 
 
@@ -126,7 +126,7 @@ def _form_factor(axes: Axes, chosen: xr.Dataset) -> Line2D:
     return line
 
 
-def _probabilities(panels: Panels, frames: Frames, limits: Limits | None) -> list[Artist]:
+def _probabilities(panels: Panels, frames: Frames, limits: Limits) -> list[Artist]:
     """Draw the probabilities of counts over the one long axis, or as bars over counts; returns legend entries."""
     for axes, chosen in frames:
         if panels.across in ([], ["count"]):
@@ -135,7 +135,7 @@ def _probabilities(panels: Panels, frames: Frames, limits: Limits | None) -> lis
             _probability_curves(axes, chosen, panels.across[0])
         if chosen["probability"].isnull().all():
             write_words(axes, "all samples failed" if "status" in chosen else "no probability is known")
-        axes.set_ylim(limits or (0, 1.02))
+        axes.set_ylim(ends(limits, 0, 1.02))
         axes.grid(alpha=0.3)
     shown = [axes for axes, chosen in frames if chosen["probability"].notnull().any()]
     return shown[0].get_legend_handles_labels()[0] if shown else []

@@ -16,7 +16,7 @@ from sweep.grid import Array
 from sweep.plots import labels, scales, theory
 from sweep.plots.marks import BLANK, legend, marks
 from sweep.plots.quantities import field
-from sweep.plots.scales import Limits, Scale
+from sweep.plots.scales import AUTO, Limits, Scale
 from sweep.plots.theory import Line, table
 from sweep.results.margins import Counts
 
@@ -90,7 +90,7 @@ def along(dataset: xr.Dataset, dim: str) -> Array:
     return np.asarray(dataset[dim].values, float)
 
 
-def common_scale(maps: Sequence[Map], limits: Limits | None = None, cmap: str | None = None) -> Scale:
+def common_scale(maps: Sequence[Map], limits: Limits = AUTO, cmap: str | None = None) -> Scale:
     """Return the scale of a map, or the common scale of several maps of one kind of value."""
     first = maps[0]
     values = np.concatenate([each.shown for each in maps])

@@ -173,6 +173,7 @@ class Picture(Figure):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
 
+
 def _columns(entries: list[str], width: float) -> list[list[str]]:
     """Share the entries of a legend among as many columns as fit in this width in inches, as matplotlib does."""
     for count in range(len(entries), 0, -1):

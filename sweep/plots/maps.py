@@ -15,7 +15,7 @@ from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.marks import legend, with_results
 from sweep.plots.panels import Panel, Panels, title
-from sweep.plots.scales import Limits, Scale, thinned
+from sweep.plots.scales import AUTO, Limits, Scale, thinned
 
 _WIDEST = 4.4
 """Largest width of a map in inches."""
@@ -33,7 +33,7 @@ _OF_DIFFERENCES = ("failed", "not_run", "impossible", "no_value", "time_limit")
 """Kinds of cell that maps of differences and ratios mark too; the map of the simulated counts next to them has all."""
 
 
-def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) -> Picture:
+def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Picture:
     """Draw a map of each variable over two axes, and one such row for each value of the other axes.
 
     All maps of a variable and of its prediction share a scale and its bar; the legend explains flags.
@@ -62,7 +62,7 @@ def draw(panels: Panels, limits: Limits | None = None, cmap: str | None = None) 
     return figure
 
 
-def draw_in(axes: Axes, panels: Panels, limits: Limits | None, cmap: str | None) -> None:
+def draw_in(axes: Axes, panels: Panels, limits: Limits, cmap: str | None) -> None:
     """Draw the map of the first variable into these axes, with its bar beside them."""
     name = panels.names[0]
     shown = _maps(panels, [name])[0][name]
@@ -81,7 +81,7 @@ def _maps(panels: Panels, names: list[str]) -> Maps:
     return [{name: describe(panels.dataset.isel(panel), name, right, down) for name in names} for panel in panels.each]
 
 
-def _scales(panels: Panels, maps: Maps, limits: Limits | None, cmap: str | None) -> dict[str, Scale]:
+def _scales(panels: Panels, maps: Maps, limits: Limits, cmap: str | None) -> dict[str, Scale]:
     """The scale of each variable, the same in all panels; simulated and predicted values share one."""
     common = common_scale([each[name] for each in maps for name in panels.names], limits, cmap)
     return dict.fromkeys(panels.names, common) | {

@@ -68,7 +68,8 @@ def plot(
     x: str | None = None,
     y: str | None = None,
     at: Mapping[str, float] | None = None,
-    limits: Limits | None = None,
+    vmin: float | None = None,
+    vmax: float | None = None,
     cmap: str | None = None,
     width: str | None = None,
     title: str | None = None,
@@ -87,7 +88,8 @@ def plot(
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
     at : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
-    limits : lowest and highest value of the scale
+    vmin, vmax : lowest and highest value of the scale, or of the vertical axis of curves; by default those that are
+        drawn
     cmap : name of a colour map of matplotlib
     width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, except subscripts,
         and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
@@ -117,9 +119,9 @@ def plot(
     """
     if output is not None and suffix(local_path(output)) not in PICTURES:
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
-    limits = _pair(limits, "limits", "a lower and a higher finite number, such as (0, 5)", lambda low, high: low < high)
-    if limits is not None and max(map(abs, limits)) > scales.LARGEST:
-        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers up to {scales.LARGEST:g}", "limits")
+    low, high = _limit(vmin, "vmin"), _limit(vmax, "vmax")
+    if low is not None and high is not None and not low < high:
+        raise fault_of(f"{high:g} is not above vmin, {low:g}; give a larger number", "vmax")
     if ax is not None and width is not None:
         raise fault_of("the given axes have their own size; leave it out", "width")
     if at is not None and not isinstance(at, Mapping):
@@ -131,7 +133,7 @@ def plot(
     if variable is None and isinstance(dataset, xr.DataArray):
         variable = str(dataset.name)
     opened = _opened(dataset)
-    axes, how = {"x": x, "y": y, "at": at}, {"limits": limits, "cmap": cmap}
+    axes, how = {"x": x, "y": y, "at": at}, {"limits": (low, high), "cmap": cmap}
     if ax is not None:
         _draw_in(ax, opened, variable, axes, how)
         figure = cast(Figure, ax.get_figure(root=True))
@@ -166,8 +168,9 @@ def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how:
     if of_kind is CHANGES:
         raise fault_of(f"{CHANGES.words} have no figure; use `sweep info` or print the dataset")
     if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
-        options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, **how}
-        if given := [name for name, value in options.items() if value]:
+        low, high = how["limits"]
+        options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, "cmap": how["cmap"]}
+        if given := [name for name, value in {**options, "vmin": low, "vmax": high}.items() if value not in (None, {})]:
             raise fault_of(f"not for a figure of {of_kind.words}; leave it out", given[0])
         require_whole(dataset)
         return _OWN[of_kind](dataset) if variable is None else trajectories.draw(dataset, variable)
@@ -195,24 +198,26 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
     curves.draw(chosen, [(ax, chosen.dataset.isel(chosen.each[0]))], how["limits"])
 
 
-def _require_scale(chosen: panels.Panels, limits: Limits | None, cmap: str | None) -> None:
+def _require_scale(chosen: panels.Panels, limits: Limits, cmap: str | None) -> None:
     """Raise a `InputError` for limits or a colour map that the chosen panels have no scale for."""
     name = chosen.names[0]
-    if limits is not None and labels.flag_words(chosen.dataset, name):
-        raise fault_of(f"{name} is drawn as categories, which have no scale; leave them out", "limits")
+    if limits != scales.AUTO and labels.flag_words(chosen.dataset, name):
+        option = "vmax" if limits[0] is None else "vmin"
+        raise fault_of(f"{name} is drawn as categories, which have no scale; leave it out", option)
     if cmap is not None and len(chosen.across) < 2:
         raise fault_of(f"{name} is drawn as a curve, which has no colour scale; leave it out", "cmap")
 
 
-def _pair(given: Any, option: str, wanted: str, fits: Callable[[float, float], bool]) -> tuple[float, float] | None:
-    """Return an argument that has to be a pair of finite numbers that fit; None if it is not given."""
+def _limit(given: Any, option: str) -> float | None:
+    """Return an end of the scale; None if it is not given."""
     if given is None:
         return None
-    pair = plain_data(given)
-    finite = isinstance(pair, list) and len(pair) == 2 and all(is_number(n) and isfinite(n) for n in pair)
-    if not (finite and fits(*pair)):
-        raise fault_of(refusal(given, wanted), option)
-    return float(pair[0]), float(pair[1])
+    end = plain_data(given)
+    if not (is_number(end) and isfinite(end)):
+        raise fault_of(refusal(given, "a finite number"), option)
+    if abs(end) > scales.LARGEST:
+        raise fault_of(f"{end:g}; give a number from {-scales.LARGEST:g} to {scales.LARGEST:g}", option)
+    return float(end)
 
 
 def inches(width: str) -> float:

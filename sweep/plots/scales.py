@@ -17,7 +17,11 @@ from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, LogNorm, N
 from sweep.faults import brief, fault_of
 from sweep.grid import Array
 
-Limits = tuple[float, float]
+Limits = tuple[float | None, float | None]
+"""The lowest and the highest value of a scale; the values determine an end that is None."""
+
+AUTO: Limits = (None, None)
+
 Arrows = Literal["both", "min", "max", "neither"]
 
 SEQUENTIAL, DIVERGING = "viridis", "PuOr_r"
@@ -65,7 +69,23 @@ def colour_map(name: str) -> Colormap:
     return mpl.colormaps[name]
 
 
-def counts(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+def ends(limits: Limits, low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a scale, of which values from `low` to `high` determine those without a limit.
+
+    Raises
+    ------
+    InputError
+        if the only limit is beyond all values.
+    """
+    first, last = limits
+    first, last = float(low if first is None else first), float(high if last is None else last)
+    if first > last:
+        option, value, other = ("vmin", first, "vmax") if limits[1] is None else ("vmax", last, "vmin")
+        raise fault_of(f"{value:g} is beyond all values, {low:g} to {high:g}; give {other} too", option)
+    return first, last
+
+
+def counts(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
     """A colour for each count; where there are many, the higher ones share colours, in ranges of round numbers.
 
     Parameters
@@ -73,21 +93,21 @@ def counts(values: Array, limits: Limits | None = None, name: str | None = None)
     values : integers
     limits : lowest and highest count with their own colours; all counts beyond share one colour on either side
     """
-    low, high = (round(float(end)) for end in limits or (values.min(), values.max()))
+    low, high = map(round, ends(limits, values.min(), values.max()))
     return _stepped(low + _steps(high - low, _MAX_COUNTS), values, name or SEQUENTIAL)
 
 
-def differences(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+def differences(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
     """A diverging scale of integers, symmetric about zero, which has its own colour."""
-    top = max(round(float(np.abs(limits or values).max(initial=0))), 1)
+    top = max(round(float(np.abs(_given(limits) or values).max(initial=0))), 1)
     side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
     return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
 
 
-def continuous(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+def continuous(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
     """A scale of real numbers: about zero if they have both signs, logarithmic if they span orders of magnitude."""
     finite = values[np.isfinite(values)]
-    low, high = limits or ((float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0))
+    low, high = ends(limits, *((finite.min(), finite.max()) if len(finite) else (0.0, 1.0)))
     if low == high:
         low, high = low - 0.1 * (abs(low) or 1.0), high + 0.1 * (abs(high) or 1.0)
     if low < 0 < high:
@@ -97,7 +117,7 @@ def continuous(values: Array, limits: Limits | None = None, name: str | None = N
     return _smooth(finite, norm, name or SEQUENTIAL)
 
 
-def ratios(values: Array, limits: Limits | None = None, name: str | None = None) -> Scale:
+def ratios(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
     """A diverging scale of positive numbers, logarithmic and the same on both sides of one.
 
     Raises
@@ -105,11 +125,13 @@ def ratios(values: Array, limits: Limits | None = None, name: str | None = None)
     InputError
         if a limit is not positive.
     """
-    if limits and not limits[0] > 0:
-        raise fault_of(f"{limits[0]:g}..{limits[1]:g}; give numbers above zero for a ratio", "limits")
+    for option, end in zip(("vmin", "vmax"), limits, strict=True):
+        if end is not None and end <= 0:
+            raise fault_of(f"{end:g}; give a number above zero for a ratio", option)
     finite = values[np.isfinite(values) & (values > 0)]
     most = float(np.abs(np.log(finite)).max(initial=0.01))
-    top = max(np.abs(np.log(limits))) if limits else min(most, log(_MAX_RATIO))
+    given = np.abs(np.log(_given(limits)))
+    top = given.max() if given.size else min(most, log(_MAX_RATIO))
     return _smooth(finite, LogNorm(exp(-top), exp(top)), name or DIVERGING)
 
 
@@ -119,6 +141,10 @@ def flags(words: dict[int, str], name: str | None = None) -> Scale:
     shades = colour_map(name or SEQUENTIAL)(np.linspace(0.95, 0.05, len(values)))
     bounds = [values[0] - 0.5, *((a + b) / 2 for a, b in pairwise(values)), values[-1] + 0.5]
     return Scale(ListedColormap(shades), BoundaryNorm(bounds, len(values)), {float(v): words[v] for v in values})
+
+
+def _given(limits: Limits) -> list[float]:
+    return [end for end in limits if end is not None]
 
 
 def _smooth(values: Array, norm: Normalize, name: str) -> Scale:

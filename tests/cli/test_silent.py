@@ -28,10 +28,7 @@ def file(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (
-            "--variable status --limits 0..5",
-            "limits: status is drawn as categories, which have no scale; leave",
-        ),
+        ("--variable status --vmin 0", "vmin: status is drawn as categories, which have no scale; leave it out"),
         ("--at n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
         ("--at n0=0.066", "--at n0: 0.066 is far from all its values, 0.02 to 0.05; choose one of them"),
         ("--at n0=0.02 --at n0=0.05", "--at n0: must be one finite number, not [0.02, 0.05]"),
@@ -49,7 +46,7 @@ def test_what_a_picture_has_no_use_for_is_refused(options: str, said: str, file:
         ("--at n0=0.04", "quick_n0=0.04.png"),
         ("--variable form_factor", "quick_form_factor.png"),
         ("--x n0 --y mu --width 85mm --title=", "quick_x=n0_y=mu_width=85mm_title=.png"),
-        ("--limits 0..3", "quick_limits=0..3.png"),
+        ("--vmin 0 --vmax 3", "quick_vmin=0_vmax=3.png"),
     ],
 )
 def test_the_picture_of_the_run_is_not_overwritten(options: str, name: str, file: Path) -> None:

@@ -170,7 +170,7 @@ def test_a_search_asks_for_numbers(write: Write, verb: str) -> None:
 def test_bars_curves_and_maps_of_probabilities(write: Write) -> None:
     two = sweep.run(write(SCENE), t_end=1000)
     curves = sweep.plot(two).axes[0]
-    assert sweep.plot(two, limits=(0.2, 0.8)).axes[0].get_ylim() == (0.2, 0.8)
+    assert sweep.plot(two, vmin=0.2, vmax=0.8).axes[0].get_ylim() == (0.2, 0.8)
     assert [line.get_label() for line in curves.lines][:2] == ["1 reversal or more", "2 reversals or more"]
     one = sweep.run(write(SCENE), t_end=1000, b=3)
     bars = sweep.plot(one).axes[0]

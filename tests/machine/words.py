@@ -32,7 +32,6 @@ AXES = ("mu", "b", "n0", "c")
 
 TEXTS: dict[str | None, tuple[str, ...]] = {
     "NAME=VALUE": tuple(f"{name}={value}" for name in (*AXES, *PARAMETERS) for value in (60, 3, 0.05, 0, -1, "2deg")),
-    "LOW..HIGH": ("0..5", "-1..1", "0..1e7", "5..1", "1e-9..2e-9", "0..0.5"),
     "LENGTH": ("85mm", "50mm", "3in", "17 cm", "2mm", "1"),
     "NUMBER[+-ERROR]UNIT": ("12.0+-0.1cm", "30g", "1.24g/cm3", "2deg", "5mm", "1 in", "x"),
     "NAME,NAME": ("mu", "n0,mu", "film_delay", "viscous,coulomb", "c", ""),
@@ -43,8 +42,8 @@ TEXTS: dict[str | None, tuple[str, ...]] = {
 
 VALUES: dict[str, tuple[Any, ...]] = {
     "x": AXES, "y": AXES, "variable": (*VARIABLES, *DERIVED),
-    "at": ({"n0": 0.05}, {"mu": 60}, {"b": 3}, {"case": 0}),
-    "title": ("", "A title", "μ & $"), "limits": ((0, 5), (-1, 1), (1, 0), (0, 1e7)),
+    "at": ({"n0": 0.05}, {"mu": 60}, {"b": 3}, {"case": 0}), "title": ("", "A title", "μ & $"),
+    "vmin": (-1, 0, 1.5), "vmax": (0, 5, 1e7),
     "cmap": ("viridis", "no"), "width": ("85mm", "50mm", "3in"),
     "bracket": (0.01, 0.1, 0.5), "deviation": (0.01, 0.1), "every": (0.5, 5.0, 1e3), "samples": (1, 2),
     "speed": (1.0, 10.0), "laws": ((), ("viscous",)),

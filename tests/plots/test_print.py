@@ -117,12 +117,12 @@ def test_a_figure_is_laid_out_once(width: str | None, tmp_path: Path, monkeypatc
 
 def test_a_width_without_room_is_refused_with_one_that_has(tmp_path: Path) -> None:
     with mpl.rc_context({"font.size": 16}):
-        with pytest.raises(InputError, match="^width: too narrow for this figure; give ") as refused:
+        with pytest.raises(InputError, match=r"^width: too narrow for this figure; give ") as refused:
             picture.plot(made(), width="50mm")
         given = str(refused.value).split("give ")[1].split(" ")[0]
         assert picture.plot(made(), width=given).get_figwidth() * 25.4 == pytest.approx(float(given.removesuffix("mm")))
     wordy = made().assign(spin_final=lambda one: one.spin_final.assign_attrs(long_name="spin at the end " * 99))
-    with pytest.raises(InputError, match="^width: its words leave no room for the panels; give a larger width"):
+    with pytest.raises(InputError, match=r"^width: its words leave no room for the panels; give a larger width"):
         picture.plot(wordy, "spin_final", width="85mm", output=tmp_path / "wordy.png")
     assert not list(tmp_path.iterdir())
 
