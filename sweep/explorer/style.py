@@ -21,7 +21,7 @@ from sweep.explorer.state import State
 from sweep.grid import Array
 from sweep.plots import marks, scales
 from sweep.plots.description import Map, common_scale
-from sweep.plots.scales import Scale
+from sweep.plots.scales import AUTO, Scale
 
 SOFT = "#77828d"
 """A grey that can be read on a light page and on a dark one."""
@@ -93,7 +93,7 @@ def scale_of(part: Map, state: State, *others: Map) -> Scale:
         return common_scale([part, *others], cmap=palette)
     low, high = state.limits.get("low", shown.min()), state.limits.get("high", shown.max())
     possible = low < high and (low > 0 or part.name != "ratio")
-    return common_scale([part], (low, high) if possible else None, palette)
+    return common_scale([part], (low, high) if possible else AUTO, palette)
 
 
 def is_logarithmic(scale: Scale) -> bool:

@@ -32,7 +32,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)
     figure = Picture(dataset, width * columns + 0.6, 1.2 + width * RATIO * rows)
-    scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int), None, None)
+    scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int))
     for axes, (words, part) in zip(figure.panels(rows, columns, len(panels)), panels, strict=True):
         axes.set_title(words)
         set_scale(axes, "x", _axis(dataset, x).values)

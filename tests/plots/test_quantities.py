@@ -151,11 +151,20 @@ def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Datase
         assert (mapper.low, mapper.high, list(bar.major_label_overrides.values())[2]) == (0.5, 2, "1")
 
 
-@pytest.mark.parametrize(("variable", "limits", "arrows"), [("ratio", None, "max"), ("energy_error", None, "neither"),
-                                                            ("t_first_reversal", (100, 200), "max"),
-                                                            ("spin_error", (2, 3), "min")])  # fmt: skip
-def test_a_bar_has_arrows_where_values_lie_beyond(variable: str, limits: Any, arrows: str, whole: xr.Dataset) -> None:
-    bars = [axes for axes in picture.plot(whole, variable, limits=limits).axes if hasattr(axes, "_colorbar")]
+@pytest.mark.parametrize(
+    ("variable", "limits", "arrows"),
+    [
+        ("ratio", {}, "max"),
+        ("energy_error", {}, "neither"),
+        ("t_first_reversal", {"vmax": 200}, "max"),
+        ("t_first_reversal", {"vmin": 100, "vmax": 200}, "max"),
+        ("spin_error", {"vmin": 2, "vmax": 3}, "min"),
+    ],
+)
+def test_a_bar_has_arrows_where_values_lie_beyond(
+    variable: str, limits: dict[str, float], arrows: str, whole: xr.Dataset
+) -> None:
+    bars = [axes for axes in picture.plot(whole, variable, **limits).axes if hasattr(axes, "_colorbar")]
     assert bars[-1]._colorbar.extend == arrows
     assert variable != "ratio" or bars[-1].get_yticklabels()[2].get_text() == "1"
 
