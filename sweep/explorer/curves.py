@@ -132,7 +132,7 @@ def _drawn_samples(series: Sequence[Array]) -> Array:
 
 def _figure(height: int, name: str) -> Any:
     plot = figure(
-        height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset",
+        height=height, min_width=220, sizing_mode="stretch_width", tools="pan,box_zoom,wheel_zoom,reset,save",
         active_drag="box_zoom", toolbar_location="right", name=name, outline_line_color=None,
     )  # fmt: skip
     plot.toolbar.autohide = True

@@ -8,7 +8,6 @@ smoothly.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -45,10 +44,6 @@ class MapFigure:
 
     _look: tuple[Any, ...] = ()
     """Everything that bar, cuts and tooltips were last labelled for."""
-
-    _highest: Sequence[Map] = ()
-    """The map with the highest counts, whose colours counts keep while a slider moves: a new scale takes a third of a
-    second."""
 
     def __init__(self, source: Source, x: str, y: str) -> None:
         self._source, self.axes = source, (x, y)
@@ -93,11 +88,10 @@ class MapFigure:
         if other is None:
             part, known = self._source.map(state.show, *self.axes, state.at), self._source.cell
             scale = style.scale_of(part, state)
-            self._highest = [part] if part.name == Reversals.name else []
         else:
             part, known = describe(other, next(iter(map(str, other.data_vars))), *self.axes), other
-            scale = style.scale_of(part, state, *self._highest)
-            self._highest = [max([*self._highest, part], key=lambda each: each.shown.max(initial=0))]
+            counted = [Reversals.name] if Reversals.name in self._source.variables else []
+            scale = style.scale_of(part, state, *(self._source.map(name, *self.axes, state.at) for name in counted))
         logarithmic = style.is_logarithmic(scale)
         for image in self._images:
             image.visible = (image is self._images[1]) == logarithmic
@@ -201,7 +195,7 @@ def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
         y_axis_type=style.kind(up),
         x_axis_label=source.label(across.name),
         y_axis_label=source.label(up.name) if up.name else None,
-        tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom", toolbar_location="above",
+        tools="pan,box_zoom,wheel_zoom,reset,save", active_drag="box_zoom", toolbar_location="above",
         background_fill_color="#e8ebee",
     )  # fmt: skip
     plot.grid.visible = False

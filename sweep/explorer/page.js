@@ -235,17 +235,7 @@ const sweep = (() => {
 
   // ---- the dark page
 
-  /** What the visitor chose last, kept if told; a browser may refuse to remember anything for a notebook's frame. */
-  function preferred(choice) {
-    try {
-      if (choice) localStorage.setItem("theme", choice)
-      return localStorage.getItem("theme")
-    } catch {
-      return choice
-    }
-  }
-
-  /** Take over a choice, or else what the system wants; Bokeh takes its colours from the style sheet. */
+  /** Make the page dark or light, by default as the system is; Bokeh takes its colours from the style sheet. */
   function theme(choice) {
     const wanted = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"
     document.documentElement.dataset.theme = choice ?? wanted
@@ -253,73 +243,16 @@ const sweep = (() => {
   }
 
   function turn() {
-    theme(preferred(document.documentElement.dataset.theme === "dark" ? "light" : "dark"))
+    theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark")
   }
 
-  theme(preferred())
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => theme(preferred()))
+  theme()
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => theme())
 
-  // ---- address, downloads, pictures
-
-  /** Call the function of this object that the server names. */
-  function called({name: [name], given: [given]}) {
-    api[name](...given)
-  }
+  // ---- the address
 
   function address(query) {
     history.replaceState(null, "", `?${query}`)
-  }
-
-  function save(content, name) {
-    const link = document.createElement("a")
-    link.href = URL.createObjectURL(new Blob([content]))
-    link.download = name
-    link.click()
-    setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
-  }
-
-  /** The legend of the map as an image: an SVG may hold HTML. */
-  async function legend(scale) {
-    const view = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name("legend"))
-    const text = view.shadow_el.querySelector(".bk-clearfix")
-    const {width, height} = text.getBoundingClientRect()
-    const {color, font} = getComputedStyle(text)
-    const copy = Object.assign(text.cloneNode(true), {style: `color: ${color}; font: ${font}; margin-left: 12px`})
-    const html = new XMLSerializer().serializeToString(copy)
-    const [across, down] = [width + 12, height + 16]
-    const svg = `<svg xmlns="http://www.w3.org/2000/svg" width="${scale * across}" height="${scale * down}">
-      <foreignObject width="${across}" height="${down}" transform="scale(${scale})">${html}</foreignObject></svg>`
-    const image = new Image()
-    image.src = `data:image/svg+xml,${encodeURIComponent(svg)}`
-    await image.decode()
-    return image
-  }
-
-  /** The figures that can be seen, one below the other, with the page's title and the map's legend, as one PNG. */
-  async function picture(figures, name) {
-    const views = figures.map((figure) => Bokeh.index.find_one(figure)).filter((view) => view?.el.offsetParent)
-    const layers = views.map((view) => view.export("png", true).canvas)
-    const scale = window.devicePixelRatio
-    layers.splice(1, 0, await legend(scale))
-    const canvas = document.createElement("canvas")
-    const head = 56 * scale
-    canvas.width = Math.max(...layers.map((layer) => layer.width))
-    canvas.height = layers.reduce((sum, layer) => sum + layer.height, head)
-    const pen = canvas.getContext("2d")
-    const {color, backgroundColor} = getComputedStyle(document.querySelector("#maps"))
-    pen.fillStyle = backgroundColor
-    pen.fillRect(0, 0, canvas.width, canvas.height)
-    pen.fillStyle = color
-    pen.font = `600 ${15 * scale}px system-ui, sans-serif`
-    pen.fillText(document.querySelector("h1").textContent, 12 * scale, 22 * scale)
-    pen.font = `${12 * scale}px system-ui, sans-serif`
-    pen.fillText(document.querySelector("#constants").textContent, 12 * scale, 42 * scale)
-    let y = head
-    for (const layer of layers) {
-      pen.drawImage(layer, 0, y)
-      y += layer.height
-    }
-    canvas.toBlob((blob) => save(blob, name))
   }
 
   async function copy(button) {
@@ -331,6 +264,5 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  const api = {address, called, copy, moment, number, picture, play, point, save, tap, turn, use}
-  return api
+  return {address, copy, moment, number, play, point, tap, turn, use}
 })()

@@ -34,9 +34,6 @@ _NAMED = 5
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
 
-_ENDED = ("beside", "spacing")
-"""Keys of links from older versions, which are ignored."""
-
 PALETTES = ("", "viridis", "cividis", "inferno", "turbo", "gray", "PuOr_r", "coolwarm")
 """Colour maps of matplotlib to choose from; without one a variable has its default."""
 
@@ -167,7 +164,7 @@ def read(
             state = replace(state, limits={**state.limits, key: at})
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])}: give a number from {-LARGEST:g} to {LARGEST:g}")
-        elif key not in ("cell", "with", *_ENDED):
+        elif key not in ("cell", "with"):
             unknown.append(f"'{brief(key)}'")
     if unknown:
         expected = ", ".join([*all_choices, *LIMITS, "with", "cell"])

@@ -10,7 +10,7 @@ from typing import Any
 from bokeh.document import Document
 from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 
-from sweep.explorer import bodies, controls, export, figure, page
+from sweep.explorer import bodies, controls, figure, page
 from sweep.explorer import state as states
 from sweep.explorer.curves import Curves
 from sweep.explorer.page import PARTS
@@ -59,8 +59,8 @@ class View:
     # ---- parts of the page
 
     def _build(self) -> None:
-        self._calls = ColumnDataSource({"name": [], "given": []}, name="calls")
-        self._calls.js_on_change("data", CustomJS(code="sweep.called(cb_obj.data)"))
+        self._address = ColumnDataSource({"query": []})
+        self._address.js_on_change("data", CustomJS(code="sweep.address(cb_obj.data.query[0])"))
         self._map = Column(sizing_mode="stretch_width", name="map")
         self._legend = Div(sizing_mode="stretch_width", name="legend")
         self._cell = Div(sizing_mode="stretch_width", name="cell")
@@ -72,12 +72,8 @@ class View:
         self._chosen = controls.CellControls(self._source, self._base, self._known, *edits)
         self._document.js_on_event("document_ready", self._figures.player.moment)
         for root in (self._controls.root, self._notice, self._map, self._legend, self._body.root, self._cell,
-                     self._figures.root, self._figures.player.root, self._chosen.root, self._buttons()):  # fmt: skip
+                     self._figures.root, self._figures.player.root, self._chosen.root, self._link()):  # fmt: skip
             self._document.add_root(root)
-
-    def _call(self, name: str, *given: Any) -> None:
-        """Call a function in page.js."""
-        self._calls.data = {"name": [name], "given": [given]}
 
     # ---- the map
 
@@ -209,7 +205,7 @@ class View:
         self._draw_curves()
         self._draw_progress()
         self._point()
-        self._call("address", self._query())
+        self._address.data = {"query": [self._query()]}
 
     def _draw_curves(self) -> None:
         curves = self._drawn.curves
@@ -240,33 +236,16 @@ class View:
         self._leave_other()
         self._drawn.leave()
 
-    # ---- files
-
     def _query(self) -> str:
         return states.write(self.state, self._source, self._base)
 
-    def _buttons(self) -> Row:
-        """Make the buttons that copy the address and save the figures."""
+    def _link(self) -> Row:
+        """Make the button that copies the address."""
         link = Button(label="Copy link", name="link", width=92)
         link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
-        png = Button(label="PNG", name="png", width=64)
-        figures = [self._figures.spin, self._figures.energy, self._figures.player.figure]
-        args = {"map": self._map, "figures": figures, "name": f"{export.stem(self._source)}.png"}
-        png.js_on_click(CustomJS(args=args, code="sweep.picture([...map.children, ...figures], name)"))
-        files = [Button(label=label, name=label, width=76) for label in ("CSV", "YAML") if self._setup]
-        for button in files:
-            button.on_click(partial(self._save, button.label))
-        # The calls are attached to a root, because models that only a callback of the document refers to are not
+        # The address is attached to a root, because models that only a callback of the document refers to are not
         # updated.
-        return Row(link, png, *files, name="save", tags=[self._calls], stylesheets=[controls.WIDGETS],
-                   styles={"flex-wrap": "wrap"})  # fmt: skip
-
-    def _save(self, label: str) -> None:
-        """Let the browser save the curves as CSV, or the configuration as YAML."""
-        assert self._setup
-        curves = label == "CSV"
-        content = export.csv(self._drawn.curves) if curves else export.yaml(self._source, self._setup, self.state)
-        self._call("save", content, f"{export.stem(self._source)}.{label.lower()}")
+        return Row(link, name="share", tags=[self._address], stylesheets=[controls.WIDGETS])
 
 
 def _counted(curve: Curve | None) -> str:

@@ -2,18 +2,16 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from support import own
 from support.own import PENDULUM
 
 import sweep
 from sweep.config import InputError
-from sweep.explorer import export, state
+from sweep.explorer import state
 from sweep.explorer.runner import Job
 from sweep.explorer.setup import Setup, usable, why_still
 from sweep.explorer.slices import Source, open_source
-from sweep.explorer.state import State
 from sweep.models.user import loading
 
 FEW = {"damping": [0.3, 0.5, 0.7], "torque": [0.5, 1.0, 1.2, 1.5], "t_end": 60}
@@ -98,11 +96,3 @@ def test_cells_in_an_address_know_its_parameters(source: Source, setup: Setup) -
     assert shown.cells[0] == {"damping": 0.3, "torque": 1.1, "angle": 0.5}
     _, faults = state.read({"cell": ["torque:-1"]}, source, setup.base, known)
     assert faults == ["cell=torque:-1: torque has to be a finite number >= 0 and < 10"]
-
-
-def test_its_files_make_what_is_seen(source: Source, setup: Setup, tmp_path: Path) -> None:
-    cell = {**setup.base, "torque": 1.2, "damping": 0.5}
-    text = export.yaml(source, setup, State("torque", "damping", "reversals", {}, cells=(cell,)))
-    (tmp_path / "saved.yaml").write_text(text, encoding="utf-8")
-    again = sweep.run(tmp_path / "saved.yaml")
-    np.testing.assert_array_equal(again["reversals"], source.dataset["reversals"])

@@ -12,13 +12,12 @@ from support import ROOT
 
 import sweep
 from sweep.engine.reporter import Progress
-from sweep.explorer import export, runner
+from sweep.explorer import runner
 from sweep.explorer.runner import COMPILING, Curve, Job, Runner
 from sweep.explorer.setup import Setup, usable
 from sweep.explorer.slices import Source
-from sweep.explorer.state import Cell, State
+from sweep.explorer.state import Cell
 from sweep.jit import compiling
-from sweep.kernels.status import LIFT_OFF
 
 
 def cell_at(source: Source, setup: Setup, **index: int) -> dict[str, float]:
@@ -152,19 +151,6 @@ def test_compiling_is_announced_to_all_who_wait(setup: Setup, monkeypatch: pytes
     go_on.set()
     assert second.wait().curve
     assert not second.delay
-
-
-def test_the_files_make_what_is_seen(source: Source, setup: Setup, opened: xr.Dataset, tmp_path: Path) -> None:
-    cell = cell_at(source, setup, mu=3, b=2, n0=1)
-    state = State("mu", "b", "reversals", {"n0": 1}, cells=(cell,))
-    config = tmp_path / "saved.yaml"
-    config.write_text(export.yaml(source, setup, state), encoding="utf-8")
-    again = sweep.run(config)
-    sound = opened["status"].isel(n0=1) != LIFT_OFF
-    assert sound.sum() == 19
-    np.testing.assert_array_equal(again["spin_final"].where(sound), opened["spin_final"].isel(n0=1).where(sound))
-    (line,) = [line for line in config.read_text().splitlines() if "trajectory" in line]
-    assert line == "# python -m sweep trajectory tiny_explored.yaml --at b=4 --at mu=70"
 
 
 def test_cases_are_run_with_their_own_parameters(tmp_path: Path) -> None:

@@ -63,10 +63,6 @@ def test_nothing_else_gets_through(query: str, said: str, source: Source, base: 
     assert len(fault) < 600
 
 
-def test_a_link_with_a_choice_that_has_ended_opens(source: Source, base: state.Cell) -> None:
-    assert read("beside=status&spacing=log&x=mu", source, base) == read("x=mu", source, base)
-
-
 def test_no_more_cells_than_colours(source: Source, base: state.Cell) -> None:
     query = "&".join(f"cell=mu:{50 + k}" for k in range(state.MAX_CELLS + 3))
     shown, faults = read(query, source, base)
