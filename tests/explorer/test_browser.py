@@ -664,6 +664,7 @@ def test_a_notebook_shows_the_explorer_of_a_dataset(go: Open, opened: xr.Dataset
 
 
 def test_a_figure_is_saved_by_its_toolbar(clicked: Page, tmp_path: Path) -> None:
+    clicked.once("dialog", lambda dialog: dialog.accept("map"))
     with clicked.expect_download() as download:
         clicked.locator("#map .bk-tool-icon-save").first.click()
     download.value.save_as(tmp_path / "map.png")

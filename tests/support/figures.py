@@ -55,4 +55,5 @@ def made(**axes: Any) -> xr.Dataset:
         for name, v in values.items()
     }
     constants = {"a": 10.0, "c": 1.0, "delta": 0.03}
-    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, "sign": [1, -1], **constants}, {"title": "made"})
+    attributes = {"title": "made", "sweep_kind": "run"}
+    return xr.Dataset(variables, {"mu": mu, "b": b, "n0": n0, "sign": [1, -1], **constants}, attributes)
