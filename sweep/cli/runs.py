@@ -239,12 +239,12 @@ def _files(config: Config, verb: str, output: Path | None) -> RunFiles:
 
 def _save(result: xr.Dataset, files: RunFiles) -> None:
     """Write a dataset and its picture."""
-    from sweep.plots import picture
+    from sweep.plots.attempt import attempt
     from sweep.results import netcdf
 
     files.folder.mkdir(parents=True, exist_ok=True)
     netcdf.write(files.dataset, result)
-    picture.plot(result, output=files.picture)
+    attempt(result, files.picture, partial(say, err=True))
 
 
 def _studied(task: Task, **how: Any) -> None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from sweep.config import Config, ConfigLike, InputError, load_config
+from sweep.config import Config, ConfigLike, load_config
 from sweep.engine import local
 from sweep.engine.cluster import connected, run_tiles
 from sweep.engine.enlarged import Earlier, Enlarged, is_whole, reason_against, taken_over
@@ -26,6 +26,7 @@ from sweep.grid import Tile
 from sweep.interrupt import deferred, point
 from sweep.models.user.blame import blamed
 from sweep.plots import quantities
+from sweep.plots.attempt import attempt
 from sweep.results import dataset
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
@@ -157,12 +158,7 @@ def _run_tiles(config: Config, tiles: Sequence[Tile], store: Store, count: Count
 
 def _draw(variables: Sequence[str], result: xr.Dataset, files: RunFiles, reporter: Reporter) -> None:
     """Draw the pictures of a run next to its dataset, unless they exist."""
-    from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
-
     others = quantities.pictured(result) != [*variables]  # newer than the dataset
     for path, variable in files.pictures(variables).items():
         if others or not path.exists():
-            try:
-                picture.plot(result, variable, output=path)
-            except InputError as error:
-                reporter.note(f"no picture{f' of {variable}' if variable else ''}: {error}")
+            attempt(result, path, reporter.note, variable)

@@ -21,7 +21,7 @@ from sweep.config.document import is_number, plain_data
 from sweep.faults import fault_of, local_path, refusal
 from sweep.grid import Array
 from sweep.plots import body, labels, trajectories
-from sweep.plots.figure import constants_in_lines, zero_line
+from sweep.plots.figure import constants_in_lines, drawing, zero_line
 from sweep.plots.formats import suffix
 from sweep.results.dataset import TRAJECTORIES, along_one
 from sweep.results.writing import replacing
@@ -85,7 +85,7 @@ def animate(
         more = ", or write an mp4" if in_memory else ""
         raise fault_of(f"{words}; give a speed of {(end - begin) / longest:.3g} or more{more}", "speed")
     count = int(np.ceil(FRAMES_A_SECOND * seconds)) + 1
-    scene = _Scene(shown, np.linspace(begin, end, count))
+    scene = _Scene(labels.escaped(shown), np.linspace(begin, end, count))
     animation = FuncAnimation(scene.figure, scene.show, frames=count, interval=1000 / FRAMES_A_SECOND, repeat=True)
     if path is not None:
         _save(animation, path)
@@ -187,7 +187,7 @@ class _Body:
 
 def _save(animation: FuncAnimation, path: Path) -> None:
     """Write an animation in the format that the suffix names."""
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, drawing():
         if suffix(path) == "html":
             with mpl.rc_context({"animation.embed_limit": 1000}):
                 page = animation.to_jshtml()

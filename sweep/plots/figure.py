@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from math import ceil, log
 from string import ascii_lowercase
 from textwrap import fill
 from typing import Any, Literal
+from warnings import catch_warnings, filterwarnings
 
 import matplotlib as mpl
 import numpy as np
@@ -21,7 +23,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sweep.axis import Axis
-from sweep.faults import fault_of
+from sweep.faults import brief, fault_of
 from sweep.grid import Array
 from sweep.plots import labels
 from sweep.plots.panels import MAX_PANELS, Panel, title
@@ -172,6 +174,23 @@ class Picture(Figure):
         for letter, axes in zip(ascii_lowercase, self._panels if len(self._panels) > 1 else [], strict=False):
             axes.annotate(letter, (0, 1), xycoords="axes fraction", xytext=(-4, 4), textcoords="offset points",
                           ha="right", va="bottom", weight="bold")  # fmt: skip
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Turn whatever keeps matplotlib from drawing, such as a setting or a text, into an `InputError`."""
+    with catch_warnings():
+        filterwarnings("error", "constrained_layout not applied")
+        try:
+            yield
+        except OSError:  # of the file
+            raise
+        except UserWarning:
+            words = "its words leave no room for the panels; give a larger width, or choose a smaller text"
+            raise fault_of(words, "width") from None
+        except Exception as error:
+            words = f"matplotlib cannot draw this figure: {brief(f'{type(error).__name__}: {error}')}"
+            raise fault_of(f"{words}; check its settings, such as text.usetex") from error
 
 
 def _columns(entries: list[str], width: float) -> list[list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import xarray as xr
 
@@ -124,6 +125,16 @@ def constants(dataset: xr.Dataset) -> str:
     known = {str(name): v.attrs["distribution"] for name, v in dataset.coords.items() if "distribution" in v.attrs}
     sampled = [f"{symbol(name)}: {words}{si_unit(dataset, name)}" for name, words in known.items()]
     return ", ".join([*fixed, *sampled])
+
+
+def escaped(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in whose texts each dollar sign is escaped, because matplotlib reads mathematics between two."""
+    plain = dataset.copy()
+    holders: list[Any] = [plain, *plain.variables.values()]
+    for each in holders:
+        texts = {key: text for key, text in each.attrs.items() if isinstance(text, str) and key != "config"}
+        each.attrs = {**each.attrs, **{key: text.replace("$", r"\$") for key, text in texts.items()}}
+    return plain
 
 
 def in_maths(words: str) -> str:

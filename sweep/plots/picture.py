@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, cast
-from warnings import catch_warnings, filterwarnings
 
 import matplotlib as mpl
 import xarray as xr
@@ -26,7 +25,7 @@ from sweep.plots import (
     scales,
     trajectories,
 )
-from sweep.plots.figure import Picture, framed, is_column, style
+from sweep.plots.figure import Picture, drawing, framed, is_column, style
 from sweep.plots.formats import A_PICTURE, PICTURES, suffix
 from sweep.plots.quantities import DERIVED
 from sweep.plots.scales import Limits
@@ -132,7 +131,7 @@ def plot(
         scales.colour_map(cmap)  # raises if there is none
     if variable is None and isinstance(dataset, xr.DataArray):
         variable = str(dataset.name)
-    opened = _opened(dataset)
+    opened = labels.escaped(_opened(dataset))
     axes, how = {"x": x, "y": y, "at": at}, {"limits": (low, high), "cmap": cmap}
     if ax is not None:
         _draw_in(ax, opened, variable, axes, how)
@@ -232,11 +231,6 @@ def inches(width: str) -> float:
 def save(figure: Figure, path: Path) -> None:
     """Write a figure in the format that the suffix names; the same figure gives the same bytes."""
     form = suffix(path)
-    with replacing(path) as temporary, catch_warnings():
-        filterwarnings("error", "constrained_layout not applied")
+    with replacing(path) as temporary, drawing():
         dpi = figure.dpi * (1 if form == "png" else 2)
-        try:
-            figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))
-        except UserWarning:
-            words = "its words leave no room for the panels; give a larger width, or choose a smaller text"
-            raise fault_of(words, "width") from None
+        figure.savefig(temporary, format=form, dpi=dpi, metadata=_NO_DATE.get(form))

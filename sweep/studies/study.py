@@ -28,6 +28,7 @@ from sweep.interrupt import deferred
 from sweep.kernels.measures import default
 from sweep.models import MODELS
 from sweep.models.user.blame import blamed
+from sweep.plots.attempt import attempt
 from sweep.results import netcdf
 from sweep.results.checkpoint import Checkpoint
 from sweep.results.folder import RunFiles
@@ -183,7 +184,5 @@ class Task(NamedTuple):
             files.discard_checkpoint()
             result = netcdf.open_dataset(files.dataset)
             if not files.picture.exists():
-                from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
-
-                picture.plot(result, output=files.picture)
+                attempt(result, files.picture, reporter.note)
         return result

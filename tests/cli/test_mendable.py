@@ -58,6 +58,20 @@ def test_an_error_of_the_system_that_the_user_can_mend_is_a_line(
     refused(invoke("info", file), said)
 
 
+@pytest.mark.parametrize("verb", ["run", "trajectory"])
+def test_a_picture_that_cannot_be_drawn_is_a_line_and_the_dataset_is_written(verb: str, tmp_path: Path) -> None:
+    (tmp_path / "quick.yaml").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "matplotlibrc").write_text("text.usetex: true\n", encoding="utf-8")
+    nothing = {"PATH": str(tmp_path / "nothing"), "PYTHONPATH": str(ROOT)}  # so that there is no LaTeX
+    done = python("-m", "sweep", verb, "quick.yaml", "--output", "out", folder=tmp_path, **nothing)
+    (written,) = (tmp_path / "out").iterdir()
+    assert written.suffix == ".nc"
+    assert sweep.open_dataset(written).sizes["mu" if verb == "run" else "trajectory"] == 2
+    (said,) = [line for line in done.stderr.splitlines() if "picture" in line]
+    assert said.startswith("no picture: matplotlib cannot draw this figure: RuntimeError: Failed to process string")
+    assert "Traceback" not in done.stderr
+
+
 NONSENSE = {
     "NUMBA_NUM_THREADS": ["0", "-1", "abc", "1.5"],
     "NUMBA_DISABLE_JIT": ["yes"],

@@ -1,14 +1,17 @@
 """Pictures of datasets that have lost something or have one value or none, and sizes and limits at the edge."""
 
 from collections.abc import Callable
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from support.figures import entries, made
 
 import sweep
@@ -193,6 +196,37 @@ def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None
     )
     (axes,) = picture.plot(empty).axes
     assert axes.get_title() == "no boundary was found between the cells"
+
+
+def test_dollar_signs_in_the_texts_of_a_dataset_are_written_as_they_are(tmp_path: Path) -> None:
+    r"""Matplotlib sets what stands between two as mathematics, and cannot set "\frac{"."""
+    text = r"$5 \frac{ $"
+    dataset = made().assign_attrs(title=text)
+    for name in ("reversals", "b", "delta"):
+        dataset[name].attrs.update(long_name=text, units=text)
+    for shown in (dataset, dataset.isel(b=0), dataset.isel(b=0, mu=0)):
+        figure = picture.plot(shown, "reversals", output=tmp_path / "dollars.png")
+        read = [_seen(each) for each in figure.findobj(Text) if "frac" in each.get_text()]
+        assert len(read) >= 2
+        assert all(text in each for each in read)
+    assert dataset.title == text
+
+
+def _seen(written: Text) -> str:
+    """What matplotlib draws of a text, which it sets as mathematics or not."""
+    said, is_maths = written._preprocess_math(written.get_text())
+    assert not is_maths
+    return " ".join(said.split())
+
+
+def test_what_matplotlib_cannot_draw_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))  # without LaTeX
+    with mpl.rc_context({"text.usetex": True}), pytest.raises(InputError) as refused:
+        picture.plot(made(), output=tmp_path / "tex.png")
+    assert str(refused.value).startswith("matplotlib cannot draw this figure: RuntimeError: Failed to process string")
+    assert str(refused.value).endswith("; check its settings, such as text.usetex")
+    assert "\n" not in str(refused.value)
+    assert not list(tmp_path.iterdir())
 
 
 def test_labels_of_bars_stay_in_the_figure() -> None:

@@ -1,0 +1,21 @@
+"""Draw the picture of a dataset that has been written and is complete without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray as xr
+
+from sweep.faults import Error, brief
+
+
+def attempt(result: xr.Dataset, path: Path, note: Callable[[str], None], variable: str | None = None) -> None:
+    """Draw a dataset, or one of its variables, into a file; if that fails for any reason, say so in a note."""
+    try:
+        from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
+
+        picture.plot(result, variable, output=path)
+    except Exception as error:
+        words = str(error) if isinstance(error, Error) else brief(f"{type(error).__name__}: {error}")
+        note(f"no picture{f' of {variable}' if variable else ''}: {words}")
