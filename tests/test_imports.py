@@ -23,6 +23,7 @@ FOREIGN = {
     "rich": {"progress"},
     "ruamel": {"config"},
     "scipy": {"config", "plots", "reproduce", "results", "studies"},
+    "tornado": {"explorer"},
     "trimesh": {"config"},
     "xarray": {"api", "cli", "engine", "explorer", "plots", "reproduce", "results", "studies"},
 }  # fmt: skip

@@ -97,5 +97,3 @@ def loaded(config: Path, settings: dict[str, Any]) -> Config:
 
 announce = partial(say, err=True)
 """Print a note on stderr even with --quiet: user code never runs unannounced."""
-
-

@@ -13,10 +13,13 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
+from secrets import token_urlsafe
 
 from bokeh.server.server import Server
+from tornado.routing import Rule
 
 from sweep.explorer import view
+from sweep.explorer.guard import KEY, Foreign, Refusal
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source
 
@@ -33,13 +36,15 @@ class Beside:
     """An explorer in a thread of this process; a notebook shows it as the value of a cell."""
 
     url: str
+    frame: str
+    """The address that a notebook opens, whose page may be of another site."""
     height: int
     """Pixels in a notebook."""
     close: Callable[[], None]
     """Ends the server."""
 
     def _repr_html_(self) -> str:
-        return f'<iframe src="{self.url}" width="100%" height="{self.height}" style="border: 0"></iframe>'
+        return f'<iframe src="{self.frame}" width="100%" height="{self.height}" style="border: 0"></iframe>'
 
 
 def serve(source: Source, setup: Setup | None, port: int | None, *, browser: bool, say: Callable[[str], None]) -> None:
@@ -63,11 +68,12 @@ def serve(source: Source, setup: Setup | None, port: int | None, *, browser: boo
 def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int | None = 0) -> Beside:
     """Serve until it is closed or this process ends, and return at once; by default on any free port."""
     _quieten()
+    secret = token_urlsafe()
     began, ended = Future[tuple[str, asyncio.AbstractEventLoop]](), asyncio.Event()
 
     async def work() -> None:
         try:
-            server = _server(source, setup, port)
+            server = _server(source, setup, port, secret)
         except Exception as error:  # raised in the caller's thread
             began.set_exception(error)
             return
@@ -86,10 +92,10 @@ def serve_beside(source: Source, setup: Setup | None, height: int = 0, port: int
         loop.call_soon_threadsafe(ended.set)
         thread.join(_SECONDS)
 
-    return Beside(url, height, close)
+    return Beside(url, f"{url}?{KEY}={secret}", height, close)
 
 
-def _server(source: Source, setup: Setup | None, port: int | None) -> Server:
+def _server(source: Source, setup: Setup | None, port: int | None, secret: str) -> Server:
     """Make Bokeh's server on a port, or on the first free one of `PORTS`; it refuses pages of other sites."""
     fill = view.make(source, setup)
     for each in PORTS if port is None else [port]:
@@ -98,7 +104,9 @@ def _server(source: Source, setup: Setup | None, port: int | None) -> Server:
         except OSError as error:
             last = error
             continue
-        server._tornado.websocket_origins.add(f"127.0.0.1:{server.port}")  # as well as localhost
+        foreign = Foreign(server.port, secret)
+        server._tornado.default_router.rules.insert(0, Rule(foreign, Refusal))
+        server._tornado.websocket_origins.update(foreign.hosts)
         for listening in server._http._sockets.values():  # else each click waits 40 ms twice
             listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return server

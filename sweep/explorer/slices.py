@@ -42,7 +42,7 @@ class PlacedAxis(Axis):
         return np.interp(values, [low, *self.values, high], places, left=np.nan, right=np.nan)
 
 
-ADDRESS = frozenset({"x", "y", "show", "palette", "low", "high", "with", "cell"})
+ADDRESS = frozenset({"x", "y", "show", "palette", "low", "high", "with", "cell", "frame"})
 """The keys of an address other than axes (`sweep.explorer.state`)."""
 
 

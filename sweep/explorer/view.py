@@ -13,6 +13,7 @@ from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
 from sweep.explorer import bodies, controls, figure, page
 from sweep.explorer import state as states
 from sweep.explorer.curves import Curves
+from sweep.explorer.guard import KEY
 from sweep.explorer.page import PARTS
 from sweep.explorer.runner import Curve, Drawn, Job, Runner
 from sweep.explorer.setup import Setup, why_still
@@ -267,7 +268,7 @@ def make(source: Source, setup: Setup | None) -> Callable[[Document], None]:
     def fill(document: Document) -> None:
         context: Any = document.session_context
         given = context.request.arguments.items()
-        own = {key: values for key, values in given if not key.startswith("bokeh-")}
+        own = {key: values for key, values in given if not key.startswith("bokeh-") and key != KEY}
         query = {key: [value.decode(errors="replace") for value in values] for key, values in own.items()}
         View(document, source, setup, runner, query)
 

@@ -66,7 +66,7 @@ def test_a_picture_that_cannot_be_drawn_is_a_line_and_the_dataset_is_written(ver
     done = python("-m", "sweep", verb, "quick.yaml", "--output", "out", folder=tmp_path, **nothing)
     (written,) = (tmp_path / "out").iterdir()
     assert written.suffix == ".nc"
-    assert sweep.open_dataset(written).sizes["mu" if verb == "run" else "trajectory"] == 2
+    assert "mu" in sweep.open_dataset(written).coords
     (said,) = [line for line in done.stderr.splitlines() if "picture" in line]
     assert said.startswith("no picture: matplotlib cannot draw this figure: RuntimeError: Failed to process string")
     assert "Traceback" not in done.stderr

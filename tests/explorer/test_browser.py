@@ -12,10 +12,8 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager
-from http import HTTPStatus
-from http.client import HTTPConnection
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -672,37 +670,6 @@ def test_a_figure_is_saved_by_its_toolbar(clicked: Page, tmp_path: Path) -> None
 
 
 # ---- who may come in
-
-
-@pytest.mark.parametrize(
-    ("origin", "status"),
-    [("localhost", 101), ("127.0.0.1", 101), ("evil.example", 403), ("localhost.evil.example", 403)],
-)
-def test_other_origins_are_refused(origin: str, status: int, served: str) -> None:
-    place = urlsplit(served).netloc
-    found = re.search(r'"token":"([^"]+)"', answer(place, "/")[1])
-    assert found
-    headers = {
-        "Origin": f"http://{origin}:{place.partition(':')[2]}", "Upgrade": "websocket", "Connection": "Upgrade",
-        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Version": "13",
-        "Sec-WebSocket-Protocol": f"bokeh, {found[1]}",
-    }  # fmt: skip
-    assert answer(place, "/ws", headers)[0] == status
-
-
-def answer(place: str, path: str, headers: Mapping[str, str] | None = None) -> tuple[int, str]:
-    """The status of a request, and the page if there is one."""
-    with closing(HTTPConnection(place, timeout=20)) as connection:
-        connection.request("GET", path, headers=dict(headers or {}))
-        with connection.getresponse() as response:
-            return response.status, response.read().decode() if response.status == HTTPStatus.OK else ""
-
-
-@pytest.mark.parametrize("path", ["/?bokeh-session-id=%00", "/?bokeh-token=abc", "/static/%00"])
-def test_an_address_that_means_nothing_is_refused_without_a_word(served: str, path: str) -> None:
-    """`served` asks in the end what was said on the terminal."""
-    status, _ = answer(urlsplit(served).netloc, path)
-    assert status == HTTPStatus.INTERNAL_SERVER_ERROR
 
 
 def test_only_this_machine_is_served(served: str) -> None:
