@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sweep.plots.picture import plot
 
 __all__ = [
-    "Config", "Error", "FileError", "InputError", "animate", "boundaries", "changes", "critical", "explore", "fit",
+    "Config", "Error", "FileError", "InputError", "animate", "boundaries", "critical", "explore", "fit",
     "load_config", "open_dataset", "plot", "predict", "run", "trajectory",
 ]  # fmt: skip
 
@@ -71,7 +71,7 @@ def _refuse_arguments(config: Config) -> None:
 
     if not config.origin:
         return
-    verbs = run, boundaries, changes, critical, trajectory, fit
+    verbs = run, boundaries, critical, trajectory, fit
     arguments = {name for verb in verbs for name in signature(verb).parameters}
     if wrong := sorted(arguments & {*config.table, *sections(config.table)}):
         message = f"parameter {wrong[0]!r} has the name of an argument of sweep.run or a similar function; rename it"
@@ -139,16 +139,19 @@ def boundaries(
     client: Client | str | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """Find the curves over two axes on which the number of reversals changes, for each value of the other axes.
+    """Find where the number of reversals changes: curves over two axes, or points along a single one.
 
     The cells of the configuration are simulated first. Where two neighbours along `x` or `y` have different counts,
     further simulations bracket the place between them at which each count begins. Halfway between two points, two more
-    cells check whether the smooth curve passes between them; if not, a point is added there.
+    cells check whether the smooth curve passes between them; if not, a point is added there. Curves are found for each
+    value of the other axes. Along a single axis, cells where the averaged equations estimate another count are
+    simulated as well.
 
     Parameters
     ----------
     config, output, fresh, progress, client, overrides : as for `run`
-    x, y : axes over which the curves are drawn; by default the second and the first with more than one value
+    x, y : axes over which the curves are drawn; by default the second and the first with more than one value. A
+        configuration may also have a single axis
     bracket : width of the brackets, relative to the value of the parameter along which each lies
     deviation : largest distance of the boundary, halfway between two points, from the smooth curve through them,
         relative to the lengths of the axes
@@ -162,7 +165,7 @@ def boundaries(
     Raises
     ------
     InputError, FileError
-        as `run`; also if the model is not simulated, or there are fewer than two axes.
+        as `run`; also if the model is not simulated, or there is no axis.
 
     Examples
     --------
@@ -175,48 +178,6 @@ def boundaries(
     with _prepared(config, overrides, progress) as (checked, reporter):
         task = boundaries(checked, x, y, bracket, deviation)
         return task.run(output, fresh=fresh, reporter=reporter, client=client)
-
-
-def changes(
-    config: ConfigLike,
-    *,
-    reversals: int = 1,
-    progress: bool | Callable[[float, str], None] | None = None,
-    **overrides: Any,
-) -> xr.Dataset:
-    """Find the smallest change of each parameter that gives a body more reversals, or fewer.
-
-    The slow equations foresee where the count changes, from half of each parameter's value to twice as much, one
-    parameter at a time. Simulations of the full model bracket the place.
-
-    Parameters
-    ----------
-    config : one body and one start, otherwise as for `run`; with viscous friction and without couples except `sigma`
-    reversals : how many reversals more, at least; negative for fewer
-    progress, overrides : as for `run`
-
-    Returns
-    -------
-    Dataset over the parameters: the relative `change`; `changed_at`, the first simulated value with the requested
-    count; `unchanged_at`, the last one without it, at most 0.1 % away; and `reversals`, the count at `changed_at`.
-    Where no such value is foreseen, or simulations do not confirm it, the values are NaN and `reversals` is the
-    present count. The attribute `reversals` is the present count.
-
-    Raises
-    ------
-    InputError
-        if the configuration has more than one cell, an undecided count, or a model without foreseen counts.
-
-    Examples
-    --------
-    >>> found = sweep.changes({"body": {"b": 3}, "friction": {"mu": 60}, "start": {"n0": 0.05}})
-    >>> found.attrs["reversals"], found.reversals.sel(parameter="mu").item()
-    (3, 4)
-    """
-    from sweep.studies.changes import changes
-
-    with _prepared(config, overrides, progress) as (checked, reporter):
-        return changes(checked, reversals, reporter)
 
 
 def critical(

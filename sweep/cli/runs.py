@@ -153,11 +153,11 @@ def animate(
               help="Maximum interpolation error of a curve, as a fraction of the axis length.")  # fmt: skip
 @_resumed
 def boundaries(config: Config, x: str | None, y: str | None, bracket: float, deviation: float, **how: Any) -> None:
-    """Find the curves on which the number of reversals changes.
+    """Find where the number of reversals changes.
 
-    The grid of CONFIG locates the curves over two of its axes; further simulations refine them, so that each point lies
-    between two simulated cells. Writes NAME_boundaries.nc and .png. An interrupted search keeps finished simulations,
-    and the same command resumes it.
+    The grid of CONFIG locates the curves over two of its axes, or the places along its only axis; further simulations
+    refine them, so that each point lies between two simulated cells. Writes NAME_boundaries.nc and .png. An interrupted
+    search keeps finished simulations, and the same command resumes it.
     """
     from sweep.studies.boundaries import boundaries as search
 

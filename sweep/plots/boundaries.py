@@ -1,4 +1,4 @@
-"""The curves of a dataset of `sweep boundaries`."""
+"""Draw the curves of a dataset of `sweep boundaries`, or the count along a single axis."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from sweep.axis import Axis
 from sweep.grid import Array
@@ -15,14 +17,16 @@ from sweep.plots import labels, lines, places, scales
 from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
 from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
-from sweep.results.margins import OPEN, distinct, smoothed
+from sweep.results.margins import WIDE, distinct, smoothed
 
-_OPEN: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "markeredgecolor": "0.3"}
-"""Style of points at which no boundary was found."""
+_WIDE: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "markeredgecolor": "0.3"}
+"""Style of points whose brackets are wide."""
 
 
 def draw(dataset: xr.Dataset) -> Picture:
-    """The curves of a dataset of `sweep boundaries`, each with the count that begins on it, and their open points."""
+    """Draw the boundaries over two axes or along the only one, and mark points whose brackets are wide."""
+    if "y" not in dataset.attrs:
+        return _along(dataset, dataset.attrs["x"])
     x, y = dataset.attrs["x"], dataset.attrs["y"]
     unsearched = dataset.attrs.get("pairs_not_searched")
     nothing = "no boundary was searched" if unsearched else "no count changes between the cells"
@@ -43,13 +47,42 @@ def draw(dataset: xr.Dataset) -> Picture:
             axes.plot(xs, ys, marker=alone, color=colour, linewidth=1.4, gid=f"level{level}")
         each = [Line("boundary", "", [(xs, ys)], f"{level}") for level, xs, ys in drawn]
         lines.write(axes, places.words(each, _axis(dataset, x), _axis(dataset, y)))
-        open_ = part.isel(point=(part["outcome"] == OPEN).values)
-        axes.plot(open_[x], open_[y], markersize=3, **_OPEN)
+        wide = part.isel(point=(part["outcome"] == WIDE).values)
+        axes.plot(wide[x], wide[y], markersize=3, **_WIDE)
         axes.set(xlabel=labels.label(dataset, x), ylabel=labels.label(dataset, y))
         axes.set(xlim=dataset[x].attrs["actual_range"], ylim=dataset[y].attrs["actual_range"])
-    count = int((dataset["outcome"] == OPEN).sum())
-    words = f"not found: a cell failed, or did not end ({count} of {dataset.sizes['point']})"
-    figure.explain([Line2D([], [], markersize=4, label=words, **_OPEN)] if count else [], len(every))
+    words = _wide(dataset)
+    figure.explain([Line2D([], [], markersize=4, label=words, **_WIDE)] if words else [], len(every))
+    return figure
+
+
+def _wide(dataset: xr.Dataset) -> str:
+    """Return the legend entry of points whose brackets are wide; "" if there are none."""
+    count = int((dataset["outcome"] == WIDE).sum())
+    return f"wide bracket: a cell failed or is not certain ({count} of {dataset.sizes['point']})" if count else ""
+
+
+def _along(dataset: xr.Dataset, x: str) -> Picture:
+    """Draw the count along the only axis: a step at each boundary, and a grey band over each wide bracket."""
+    width = panel_width(1, 5.2, 0.6)
+    figure = Picture(dataset, width + 0.6, 1.2 + width * RATIO)
+    (axes,) = figure.panels(1, 1, 1)
+    set_scale(axes, "x", _axis(dataset, x).values)
+    ends = np.stack([dataset["end_fewer"].values, dataset["end_more"].values])
+    counts = np.stack([dataset["reversals_fewer"].values, dataset["reversals_more"].values])
+    order = np.argsort(ends, axis=0)
+    places, counts = (np.take_along_axis(each, order, axis=0).T.ravel() for each in (ends, counts))
+    low, high = dataset[x].attrs["actual_range"]
+    if counts.size:
+        axes.plot([low, *places, high], [counts[0], *counts, counts[-1]], gid="count")
+    else:
+        axes.set_title("no count changes between the cells")
+    for i in np.flatnonzero(dataset["outcome"].values == WIDE):
+        axes.axvspan(*np.sort(ends[:, i]), color="0.85", gid="wide")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set(xlim=(low, high), xlabel=labels.label(dataset, x), ylabel="spin reversals")
+    words = _wide(dataset)
+    figure.explain([Patch(color="0.85", label=words)] if words else [])
     return figure
 
 
@@ -58,7 +91,7 @@ def curves(dataset: xr.Dataset, x: str, y: str) -> Iterator[tuple[int, Array, Ar
     axes = [_axis(dataset, name) for name in (x, y)]
     spans = [float(np.ptp(axis.straight(axis.values))) for axis in axes]
     for number in np.unique(dataset["curve"]):
-        part = dataset.isel(point=((dataset["curve"] == number) & (dataset["outcome"] != OPEN)).values)
+        part = dataset.isel(point=((dataset["curve"] == number) & (dataset["outcome"] != WIDE)).values)
         if not part.sizes["point"]:
             continue
         places = np.array([axis.straight(part[axis.name].values) / s for axis, s in zip(axes, spans, strict=True)])

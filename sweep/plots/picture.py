@@ -33,7 +33,6 @@ from sweep.results.dataset import VARIABLES
 from sweep.results.kind import (
     ATTRIBUTE,
     BOUNDARIES,
-    CHANGES,
     CRITICAL,
     FIT,
     RUN,
@@ -164,8 +163,6 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
 def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
     """Draw a dataset of any kind."""
     of_kind = kind(dataset)
-    if of_kind is CHANGES:
-        raise fault_of(f"{CHANGES.words} have no figure; use `sweep info` or print the dataset")
     if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
         low, high = how["limits"]
         options = {"variable": variable if of_kind != TRAJECTORY else None, **axes, "cmap": how["cmap"]}

@@ -56,16 +56,12 @@ CRITICAL = Kind(
 )  # fmt: skip
 BOUNDARIES = Kind(
     "boundaries", "boundaries",
-    needs=_over(("point",), *POINTS), attributes=("x", "y", "trajectories"),
+    needs=_over(("point",), *POINTS), attributes=("x", "trajectories"),
 )  # fmt: skip
 FIT = Kind(
     "fit", "a fit",
     needs=_over(("parameter",), *_FITTED) | _over(("time",), "time", "seen", "fitted"),
     attributes=("title", "undetermined"),
-)  # fmt: skip
-CHANGES = Kind(
-    "changes", "changes of a body",
-    needs=_over(("parameter",), "parameter", "value", "change", "changed_at", "reversals"), attributes=("reversals",),
 )  # fmt: skip
 RUN = Kind("run", "a run", explored=True)
 """Kinds whose variables depend on what was measured. Predictions and a part of a run count as a run."""
@@ -76,7 +72,7 @@ _MAY_BE_EMPTY, _MAY_COME = {"point"}, {"law"}
 _CODES = ("status", "level", "curve", "outcome")
 """Variables that become meaningless once averaged."""
 
-_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, CHANGES, RUN)}
+_KINDS = {kind.name: kind for kind in (TRAJECTORY, CRITICAL, BOUNDARIES, FIT, RUN)}
 
 
 def kind(dataset: xr.Dataset) -> Kind | None:

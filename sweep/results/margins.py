@@ -15,7 +15,7 @@ from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
-FOUND, OPEN, UNCERTAIN = range(3)
+FOUND, WIDE, UNCERTAIN = range(3)
 
 # If the margin to one reversal fewer is at least this share of the margin to one more, the two are the same: the spin
 # comes no nearer to zero after its last arc, so it does not show how far the next reversal is. This holds for 250 of
@@ -39,9 +39,9 @@ POINTS = {
     "reversals_more": Variable("int16", NUMBER, "spin reversals at end_more"),
     "outcome": Variable(
         "int8", NUMBER, "outcome of the search",
-        "Found if the bracket is as narrow as requested; open if a cell in it failed or met the time limit; uncertain "
-        "if the count of one of its ends is not decided.",
-        {FOUND: "found", OPEN: "open", UNCERTAIN: "uncertain"},
+        "Found if the bracket is as narrow as requested; wide if it is wider, because a cell in it failed, met the "
+        "time limit or has no certain count; uncertain if the count of one of its ends is not certain.",
+        {FOUND: "found", WIDE: "wide", UNCERTAIN: "uncertain"},
     ),
 }  # fmt: skip
 """Variables over the points of a dataset, besides `bracket`, the axis along which each bracket lies."""

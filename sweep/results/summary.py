@@ -13,8 +13,8 @@ from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
 from sweep.results.dataset import REASONS, STATUSES, TRAJECTORIES, along_one
-from sweep.results.kind import BOUNDARIES, CHANGES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
-from sweep.results.margins import FOUND, OPEN, UNCERTAIN
+from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
+from sweep.results.margins import FOUND, UNCERTAIN, WIDE
 from sweep.results.probabilities import PROBABILITIES
 
 
@@ -52,15 +52,18 @@ def contents(dataset: xr.Dataset) -> str:
 
 def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     """Summarise how many boundary points were found, and how accurately."""
-    points, open_ = dataset.sizes["point"], int((dataset["outcome"] == OPEN).sum())
+    points = dataset.sizes["point"]
     curves, simulated = len(np.unique(dataset["curve"])), dataset.attrs["trajectories"]
-    yield f"{counted(curves, 'curve')} with {counted(points, 'point')}, by {counted(simulated, 'simulation')}"
-    one = dataset.isel(point=(dataset["outcome"] == FOUND).values)
-    if found := one.sizes["point"]:
-        width = np.abs(one["end_more"] - one["end_fewer"]) / np.maximum(abs(one["end_more"]), abs(one["end_fewer"]))
-        yield f"found {found}, within a relative error of {float(width.max()):.1e} along the bracket"
-    if open_:
-        yield f"open {open_}: a cell near them failed, or did not end before the time limit"
+    words = f"{counted(curves, 'curve')} with " if "y" in dataset.attrs else ""
+    yield f"{words}{counted(points, 'point')}, by {counted(simulated, 'simulation')}"
+    ends, outcome = np.stack([dataset["end_fewer"].values, dataset["end_more"].values]), dataset["outcome"].values
+    width = np.ptp(ends, axis=0) / np.abs(ends).max(axis=0)
+    found, wide = width[outcome == FOUND], width[outcome == WIDE]
+    if found.size:
+        yield f"found {found.size}, within a relative error of {found.max():.1e} along the bracket"
+    if wide.size:
+        yield (f"wide {wide.size}: brackets up to {wide.max():.1e} wide, because a cell in them failed, did not end or "
+               "has no certain count")  # fmt: skip
     if off := int(dataset.attrs.get("middles_off", 0)):
         yield f"lost {off}: the boundary was not found halfway between two points, so the curve is split there"
     if early := int(dataset.attrs.get("cells_not_final", 0)):
@@ -100,15 +103,6 @@ def bound(one: xr.Dataset) -> str:
     """Describe the bound of a parameter whose 95 % interval reaches an end of the search; return "" for any other."""
     ends = f"below {one['upper_95'].item():.5g}", f"above {one['lower_95'].item():.5g}"
     return ("", *(f"{end} at 95 %; no interval" for end in ends), "not determined by the film")[int(one.get("edge", 0))]
-
-
-def _changes(dataset: xr.Dataset) -> Iterator[str]:
-    """Report the nearest value of each parameter that gives the requested count."""
-    yield f"{dataset.attrs['reversals']} reversals now; the requested count begins at these values of each parameter:"
-    for name in dataset["parameter"].values:
-        one = dataset.sel(parameter=name)
-        found = f"{one['changed_at'].item():<12.6g} ({one['change'].item():+.2%}): {one['reversals'].item()} reversals"
-        yield f"  {name:8} {one['value'].item():<12.6g} {found if one['change'].notnull() else 'none found'}"
 
 
 def _laws(dataset: xr.Dataset) -> Iterator[str]:
@@ -238,5 +232,4 @@ _LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {
     CRITICAL: _critical,
     BOUNDARIES: _boundaries,
     FIT: _fit,
-    CHANGES: _changes,
 }

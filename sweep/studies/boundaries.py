@@ -1,16 +1,21 @@
-"""Finds the curves on which a count changes: the grid locates them, and simulations refine them.
+"""Find the curves on which a count changes: the grid locates them, and simulations refine them.
 
 On each edge of the grid whose ends have different counts, the distance in spin from the boundary
 (`sweep.results.margins`) has a root. The curves are followed from edge to edge, with brackets around roots no narrower
 than necessary. Then all brackets are narrowed in parallel, until the simulated cells on either side are as close as
 requested.
+
+Along a single axis the boundaries are points. Its values are simulated, and the middle of each stretch between them in
+which the slow equations estimate another count. A cell whose count is not certain cannot be the end of a bracket there,
+so a bracket stays wide where no other cell is found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -21,8 +26,9 @@ from sweep.config import Config
 from sweep.engine.estimate import estimate
 from sweep.faults import fault_of
 from sweep.grid import Array
-from sweep.kernels.status import TIME_LIMIT
-from sweep.models.model import COUNT
+from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.models.model import COUNT, ENDING
+from sweep.prediction import foreseen
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
@@ -36,6 +42,12 @@ _ON = 1e-9
 _A_POINT = 8
 """Typical number of simulations that narrow a bracket to the usual width."""
 
+_PLACES = 201
+"""Least number of places along the axis at which the count is estimated."""
+
+_CLOSER = 5
+"""Times that a bracket with uncertain cells is narrowed from outside, each time halving the way to the nearest one."""
+
 Asked = tuple[Curve, Point | Middle, float]
 """A requested cell: the part and curve that it belongs to, and its place along the line."""
 
@@ -45,13 +57,14 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, devia
     require_between("bracket", width, WIDTHS)
     require_between("deviation", deviation, DEVIATIONS)
     across = chosen_axes(config, x, y)
-    message = f"boundaries over {across[0]} and {across[1]}; width of the brackets: {width!r}; deviation: {deviation!r}"
-    make = partial(Boundaries, across=across, width=width, deviation=deviation)
+    message = f"boundaries over {' and '.join(across)}; width of the brackets: {width!r}; deviation: {deviation!r}"
+    kind = Boundaries if len(across) == 2 else Along
+    make = partial(kind, across=across, width=width, deviation=deviation)
     return Task(measuring(config), "boundaries", message, make)
 
 
-def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]:
-    """Return the axes over which boundaries are curves: the named ones, or else the first two."""
+def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, ...]:
+    """Return the axes over which boundaries are curves: the named ones, or else the first two, or the only one."""
     require_certain(config)
     if COUNT not in config.equations.offers:
         raise config.error(("model",), "does not count reversals, so it has no boundaries")
@@ -60,10 +73,12 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
         if name is not None and name not in long:
             message = f"{name} is not an axis of more than one value; the axes are {', '.join(long) or 'none'}"
             raise fault_of(message, option)
-    if len(long) < 2:
-        raise config.error((), "boundaries need two axes; give two parameters more than one value")
+    if not long:
+        raise config.error((), "boundaries need an axis; give a parameter more than one value")
     if x is not None and x == y:
         raise fault_of(f"{x} is the other axis already; choose two axes", "y")
+    if len(long) == 1:
+        return (long[0],)
     rest = (name for name in long if name not in (x, y))
     up = y or next(rest)
     right = x or next(rest)
@@ -73,7 +88,7 @@ def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, str]
 class Boundaries(Search):
     """A search whose first round simulates the cells of the grid."""
 
-    def __init__(self, config: Config, store: Store, across: tuple[str, str], width: float, deviation: float) -> None:
+    def __init__(self, config: Config, store: Store, across: tuple[str, ...], width: float, deviation: float) -> None:
         super().__init__(config, store, width)
         self.across, self.deviation = across, deviation
         self.axes = {name: Axis(name, np.array(sorted(config.axes[name]))) for name in across}
@@ -122,7 +137,7 @@ class Boundaries(Search):
         return [(curve, each, place) for curve in self.curves for each in curve.searched() for place in each.wanted()]
 
     def learn(self, found: Mapping[str, Array]) -> None:
-        counts = Counts.of(found)
+        counts = self._counts(found)
         if len(self.rounds) == 1:
             self._grid["cells_not_final"] = int((found["status"] == TIME_LIMIT).sum())
             self.curves = list(self._curves(counts))
@@ -133,12 +148,17 @@ class Boundaries(Search):
         for (_, each, place), cell in zip(self._asked, cells, strict=True):
             each.learn(place, cell)
 
+    def _counts(self, found: Mapping[str, Array]) -> Counts:
+        """Return the counts of the cells requested last, among which brackets are sought."""
+        return Counts.of(found)
+
     def dataset(self) -> xr.Dataset:
         """Return the dataset of the points, with the cost of the search."""
         columns = self._columns()
-        head: dict[str, Any] = dict(zip("xy", self.across, strict=True)) | self.attributes()
-        off = sum(not middle.confirmed for curve in self.curves for middle in curve.middles.values())
-        head |= {"deviation": self.deviation, "middles_off": off, **self._grid}
+        head: dict[str, Any] = dict(zip("xy", self.across, strict=False)) | self.attributes() | self._grid
+        if len(self.across) == 2:
+            off = sum(not middle.confirmed for curve in self.curves for middle in curve.middles.values())
+            head |= {"deviation": self.deviation, "middles_off": off}
         title = f"{self.config.name}: boundaries ({self.config.model} model)"
         own = variables(POINTS, ["point"], columns)
         own["bracket"] = xr.Variable("point", columns["bracket"], {"long_name": "axis along which the bracket lies"})
@@ -194,6 +214,71 @@ class Boundaries(Search):
         places = along.straight(along.values[first : first + 2]).tolist()
         cells = dict(zip(places, map(Cell, *(each[pair].tolist() for each in known)), strict=True))
         return Point.between(along, others | {other.name: float(other.values[whole])}, cells, places, self.deviation)
+
+
+class Along(Boundaries):
+    """A search along one axis, whose curves are single points."""
+
+    def __init__(self, config: Config, store: Store, across: tuple[str, ...], width: float, deviation: float) -> None:
+        super().__init__(config, store, across, width, deviation)
+        (self.along,) = self.axes.values()
+        self.estimates = config.integrator.estimate_errors
+        self._grid = {"cells_not_final": 0}
+
+    def estimate(self) -> str:
+        words = f"then:   cells where the slow equations estimate another count, and about {_A_POINT} for each change"
+        return f"{estimate(self.config)}\n{words}"
+
+    def ask(self) -> Mapping[str, Array]:
+        if self.rounds:
+            return super().ask()
+        places = self._first()
+        fixed = {name: np.full(len(places), values[0]) for name, values in self.config.axes.items()}
+        return fixed | {self.along.name: places}
+
+    def _first(self) -> Array:
+        """Return the values of the axis, and the middle of each stretch between them with another estimated count."""
+        values = self.along.values
+        if ENDING not in self.config.tier.offers:
+            return values
+        parts = -(-(_PLACES - 1) // (len(values) - 1))
+        at = np.arange(parts * (len(values) - 1) + 1)
+        places = self.along.bent(np.interp(at / parts, np.arange(len(values)), self.along.straight(values)))
+        columns = {name: np.full(len(places), column[0]) for name, column in self.grid.columns().items()}
+        columns |= {self.along.name: places}
+        possible = ~self.config.equations.impossible(columns)
+        at, places, columns = at[possible], places[possible], {name: each[possible] for name, each in columns.items()}
+        counts = foreseen(self.config.equations, columns, check=False)["reversals_foreseen"]
+        ends = [0, *(np.flatnonzero(np.diff(counts)) + 1), len(at)]
+        between = [(first + last) // 2 for first, last in pairwise(ends) if (at[first:last] % parts).all()]
+        return np.sort(np.concatenate([values, places[between]]))
+
+    def _search(self) -> Iterator[list[Asked]]:
+        """Narrow all brackets, and those with uncertain cells from outside."""
+        self.tolerance = self.sharp(self.width)
+        yield from iter(self._wanted, [])
+        for _ in range(_CLOSER):
+            yield [(curve, point, place) for curve in self.curves for point in curve.points
+                   for place in point.root.closer()]  # fmt: skip
+            yield from iter(self._wanted, [])
+
+    def _counts(self, found: Mapping[str, Array]) -> Counts:
+        certain = found["decided"] == 1 if "decided" in found else found["status"] == SETTLED
+        return replace(Counts.of(found), known=certain)
+
+    def _curves(self, found: Counts) -> Iterator[Curve]:
+        """Return a curve with one point for each count that begins between two neighbours with certain counts."""
+        places = self.along.straight(self.rounds[0][self.along.name]).tolist()
+        others = {name: values[0] for name, values in self.config.axes.items() if name != self.along.name}
+        for two in pairwise(np.flatnonzero(found.known).tolist()):
+            few, many = sorted(int(found.reversals[i]) for i in two)
+            ends = [places[i] for i in two]
+            for level in range(few + 1, many + 1):
+                distance, measured = found.distance(level), found.borders(level)
+                cells = {places[i]: Cell(float(distance[i]), int(found.reversals[i]), True, measured[i]) for i in two}
+                point = Point.between(self.along, others, cells, ends, self.deviation)
+                point.narrow(self.width)
+                yield Curve(level, False, (self.along,), [point])
 
 
 def _sorted(table: Array, y: tuple[float, ...], x: tuple[float, ...]) -> Array:

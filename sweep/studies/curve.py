@@ -16,7 +16,7 @@ import numpy as np
 
 from sweep.axis import Axis
 from sweep.grid import Array
-from sweep.results.margins import FOUND, OPEN, UNCERTAIN, distinct, smoothed
+from sweep.results.margins import FOUND, UNCERTAIN, WIDE, distinct, smoothed
 from sweep.studies.roots import Root
 
 # Factor by which the next two cells move away from an expected place if the last two lie on the same side of the curve.
@@ -102,7 +102,7 @@ class Point(Line):
         decided = all(cell.decided for cell in cells) and cells[1].distance > 0 >= cells[0].distance
         sure = FOUND if decided else UNCERTAIN
         row: dict[str, Any] = {"end_fewer": fewer[name], "end_more": more[name], "bracket": name}
-        row |= {"outcome": OPEN if root.unknown else sure}
+        row |= {"outcome": WIDE if root.unknown else sure}
         row |= {"reversals_fewer": cells[0].reversals, "reversals_more": cells[1].reversals}
         return fewer | row | {name: (fewer[name] + more[name]) / 2}
 
@@ -191,7 +191,7 @@ class Curve:
 
     level: int
     closed: bool
-    across: tuple[Axis, Axis]
+    across: tuple[Axis, ...]
     points: list[Point]
     middles: dict[int, Middle] = field(default_factory=dict)
     """Middles by the `id` of the point before each."""

@@ -101,6 +101,11 @@ class Root:
         else:
             self.high = place
 
+    def closer(self) -> list[float]:
+        """Return the places halfway between each end and the nearest place without a value; none if all have one."""
+        blank = [place for place in self.blank if self.low < place < self.high]
+        return [(self.low + min(blank)) / 2, (max(blank) + self.high) / 2] if blank else []
+
     @property
     def _known(self) -> bool:
         """Return whether the values locate the root within the width, and that is enough."""
