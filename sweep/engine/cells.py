@@ -25,8 +25,8 @@ MET = ("met.kind", "met.time", "met.spin", "met.doubt")
 """What the last run met (`sweep.engine.failures.Met`)."""
 
 ERRORS = (
-    "error.spin", "error.rattle", "error.least", "error.reversals", "error.apart", "error.overshoot",
-    "error.nearest_approach",
+    "error.spin", "error.rattle", "error.least", "error.reversals", "error.overshoot", "error.nearest_approach",
+    "error.apart",
 )  # fmt: skip
 """What the last companion showed (`sweep.engine.errors.Errors`)."""
 
@@ -174,7 +174,7 @@ class Lives:
         self.notes.images[rows[:, None], np.array([NOTES.index(name) for name in names])] = values
 
     def enter(
-        self, rows: Array, stage: int, images: Array, *, settles: bool = False, goal: Array | float = np.inf
+        self, rows: Array, stage: int, images: Array, *, settles: Array | bool = False, goal: Array | float = np.inf
     ) -> None:
         """Set the state rows of the cells `rows` in a stage: they run to their ends, or for `goal` steps."""
         table = self.cells.kernel.table(images)

@@ -3,7 +3,7 @@
 The kernel settles a cell by a bound on what the energy of its rattle can do to the spin (`sweep.kernels.lanes`), or by
 how a rattle that rolls round and round winds down (`sweep.kernels.measures.decay`). Where the bound fails, the cell
 continues. A cell that has not settled at the end of the first leg (`stop_early`) continues to `t_end` only if the slow
-equations predict that its spin will reverse once more, or that its rattle will have wound down before then.
+equations predict that its spin will reverse once more, or while its rattle grows or winds down.
 """
 
 from __future__ import annotations
@@ -39,6 +39,10 @@ _LARGEST = 0.2
 
 # Length of a window in which a rattle that rolls round is watched, as a share of the first leg.
 _WINDOW = 0.1
+
+# A rattle is followed if it will have wound down within this multiple of the time that is left: by then the course of
+# the spin shows how it ends.
+_WINDS_DOWN = 10.0
 
 # A rattle rolls round if the body turns by more than one radian while its two modes gain half a radian on each other.
 _ROLLS = 0.5
@@ -163,6 +167,6 @@ def watch(cells: Cells, images: Array) -> None:
 
 
 def winds_down(cells: Cells) -> Array:
-    """Return whose rattle will have wound down before `t_end`, so that the rest can be followed, (cells,)."""
+    """Return whose rattle still grows, or winds down so fast that the rest can be followed, shape (cells,)."""
     first, t_end, left = cells.rules.first_leg or 0.0, cells.rules.t_end, cells.recorded(LEFT)
-    return np.asarray((left > 0) & (left * _WINDOW * first < t_end - first))
+    return np.asarray((left != 0) & (left * _WINDOW * first < _WINDS_DOWN * (t_end - first)))

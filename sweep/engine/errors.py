@@ -6,6 +6,12 @@ larger by a power of the ratio of the steps, so the difference of the two spins 
 if it amplifies errors without bound, the difference is large, and no shorter step helps. If the companion counts
 differently from the run, a slightly different start or another computer might do so too.
 
+A count is judged by where the spins of both runs will rest, as the margins are, and not by their spins at the end of
+the run, which is in mid-swing: there a delay of the last reversal looks like a large error, or like another count.
+
+After a reversal that grew from round-off no difference of two runs is an error: both have the same floor, so both are
+early. The error of such a cell is unknown: it is neither repeated nor said to miss its tolerance.
+
 Two runs can end at the same spin by chance, however wrong both are. Then their rattles differ: if the spin with the
 energy of the difference of their states is large, the cell is repeated. But the rattles agree too if the motion has
 amplified all errors along one direction. The reported error is therefore at least a small share of the expected one: of
@@ -29,7 +35,10 @@ from sweep.engine.cells import COMPANION, ERRORS, Cells, Lives
 from sweep.engine.failures import MOST_STEPS
 from sweep.engine.plan import TOLERANCE_TIME, Plan
 from sweep.grid import Array
-from sweep.kernels.measures.margin import EXTREMES
+from sweep.kernels.measures.margin import last_arc
+from sweep.kernels.measures.noise import NoiseLimited
+from sweep.kernels.measures.resting_spin import ends_as_predicted
+from sweep.kernels.measures.reversals import Reversals
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED
@@ -89,13 +98,13 @@ class Errors(NamedTuple):
     least: Array
     """Lower bound on the reported error of the spin; NaN without a companion."""
     reversals: Array
-    """Counts of the companions; NaN where there is none."""
-    apart: Array
-    """Difference of the spins relative to the spins themselves."""
+    """Counts of the companions, with the reversals that are still to come; NaN where there is none."""
     overshoot: Array
     """Estimated error of the margin to one reversal fewer; NaN if it is not measured, or without a companion."""
     nearest_approach: Array
     """Estimated error of the margin to one reversal more."""
+    apart: Array
+    """Difference of the spins relative to the spins themselves."""
 
     @property
     def reported(self) -> Array:
@@ -107,7 +116,7 @@ def accompany(lives: Lives, rows: Array) -> None:
     """Start the companions of the cells `rows`, setting their own runs aside."""
     run = lives.take(rows)
     lives.aside[rows] = run.images
-    lives.enter(rows, COMPANION, companions(run))
+    lives.enter(rows, COMPANION, companions(run), settles=limited_by_noise(run) & run.rules.settles)
 
 
 def after_companion(lives: Lives, rows: Array) -> Array:
@@ -130,9 +139,10 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     hopeless = (shorter > SHORTEST) | (errors.spin > most)
     hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
     long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
-    again = (large | by_chance) & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
+    known = ~limited_by_noise(now)
+    again = (large | by_chance) & known & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
     if not rules.fixed:
-        missed = rows[~again & (errors.reported > limit)]
+        missed = rows[~again & (errors.reported > limit) & known]
         notes["step_rule"][missed] = MISSED
     lives.cells.images[rows] = now.images
     lives.note(rows, ERRORS, stack(errors).T)
@@ -153,6 +163,11 @@ def allowed(part: Cells) -> Array:
     return np.asarray(max(part.rules.tolerance, ROUND_OFF) * longer * unit)
 
 
+def limited_by_noise(part: Cells) -> Array:
+    """Return in which cells a reversal grew from round-off, shape (cells,)."""
+    return np.asarray(part.recorded(NoiseLimited.name) > 0)
+
+
 def imbalance(part: Cells) -> Array:
     """Return the energy balance's error as one in spin, at the fastest spin that the energy allows, shape (cells,).
 
@@ -166,8 +181,12 @@ def imbalance(part: Cells) -> Array:
 
 
 def companions(part: Cells) -> Array:
-    """Return state rows at t = 0 of the companions of cells, none of which has failed."""
-    return part.start(part.kernel.table(part.images)["step"] * _ratio(part), part.times)
+    """Return state rows at t = 0 of the companions of cells, none of which has failed.
+
+    They run as long as the cells, or if round-off decides when these end, to their own ends.
+    """
+    until = np.where(limited_by_noise(part) & part.rules.settles, part.rules.t_end, part.times)
+    return part.start(part.kernel.table(part.images)["step"] * _ratio(part), until)
 
 
 def errors_of(lives: Lives) -> Errors:
@@ -192,12 +211,29 @@ def compare(part: Cells, companion: Cells) -> Errors:
     failed = np.isin(other["status"], FAILURES)
     difference, size = np.abs(spins[0] - spins[1]), np.abs(spins[0]) + np.abs(spins[1])
     apart = np.divide(difference, size, out=np.zeros_like(size), where=~failed & (size > 0))
-    counts = other["reversals"] if "reversals" in kernel.measure else np.nan
-    margins = np.stack([np.abs(part.recorded(name) - companion.recorded(name)) for name in EXTREMES]) / larger
-    margins[:, failed] = np.nan
     spin = np.where(failed, np.inf, difference / larger)
     rattle = np.where(failed, np.nan, rattle / larger)
-    return Errors(spin, rattle, _least(part, rattle), np.where(failed, np.nan, counts), apart, *margins)
+    counts, overshoot, nearest = _of_counts(part, companion, larger, failed)
+    return Errors(spin, rattle, _least(part, rattle), counts, overshoot, nearest, apart)
+
+
+def _of_counts(part: Cells, companion: Cells, larger: Array, failed: Array) -> Array:
+    """Return the counts of the companions and the errors of both margins, shape (3, cells); NaN where unknown.
+
+    Parameters
+    ----------
+    larger : ratio of the difference of two runs to the error, shape (cells,)
+    failed : mask of the cells whose companions have failed, shape (cells,)
+    """
+    if Reversals.name not in part.kernel.measure:
+        return np.full((3, len(failed)), np.nan)
+    table, other = (part.kernel.table(each.images) for each in (part, companion))
+    predicted = ends_as_predicted(table) & ~failed
+    ours, theirs = last_arc(table, predicted), last_arc(other, predicted)
+    # Round-off does not shrink with the step.
+    larger = np.where(limited_by_noise(part), np.fmin(larger, 1.0), larger)
+    margins = [np.abs(one - another) / larger for one, another in zip(ours[1:], theirs[1:], strict=True)]
+    return np.where(failed, np.nan, [theirs.reversals, *margins])
 
 
 def _least(part: Cells, rattle: Array) -> Array:
@@ -227,7 +263,7 @@ def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
     for each in lives:
         for whole, part in zip(errors, errors_of(each), strict=True):
             whole[each.cells.cells] = part
-    found["spin_error"] = errors.reported
+    found["spin_error"] = np.where(found.get(NoiseLimited.name, 0), np.nan, errors.reported)
     if "reversals" in found:
         sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
         found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a failed companion has the count NaN
@@ -239,8 +275,10 @@ def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
 def _decided(found: Mapping[str, Array], errors: Errors) -> Array:
     """Return which counts are final and certain, shape (cells,)."""
     firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
-    below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * errors.overshoot)
-    return np.asarray(firm & below & (found["margin_more"] > DECIDED * errors.nearest_approach))
+    # Two margins may agree by chance, however wrong both runs are; that both margins do so is less likely.
+    least = DECIDED * np.fmax(errors.overshoot, errors.nearest_approach)
+    below = (found["reversals"] == 0) | (found["margin_fewer"] > least)
+    return np.asarray(firm & below & (found["margin_more"] > least))
 
 
 def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:

@@ -65,6 +65,7 @@ def progress(lives: Sequence[Lives]) -> tuple[float, int]:
         usual = np.maximum(ended.mean() if len(ended) else now["goal"][first].mean(), now["done"][first])
         done += now["done"].sum() + before[stage == COMPANION].sum() + again * now["done"][stage == DONE].sum()
         left += ((1 + again) * usual - now["done"][first]).sum()
-        left += (now["goal"] - now["done"])[stage == COMPANION].sum()
+        usual = np.minimum(now["goal"], again * before)
+        left += np.maximum(usual - now["done"], 0)[stage == COMPANION].sum()
         cells, failed = cells + len(stage), failed + int((each.cells.failed & (stage == DONE)).sum())
     return cells * (done / (done + left) if done else 0.0), failed

@@ -50,7 +50,7 @@ def cheapest(model: Model, columns: Columns, tolerance: Tolerance, t_end: float)
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
     """The kernel of a method, not compiled yet, for a model and for measurements given by their specs."""
-    return Kernel(METHODS[method].stepper(model, tolerance), measures.with_decay(measures.chosen(measure), model))
+    return Kernel(METHODS[method].stepper(model, tolerance), measures.complete(measures.chosen(measure), model))
 
 
 def automatic_step(

@@ -72,10 +72,16 @@ FURTHER = {
 """Values and words of further dimensions of variables; a dimension without values is counted from one."""
 
 VARIABLES: dict[str, Variable] = {
-    **{name: spec for kind in measures.MEASURES.values() for name, spec in kind.variables.items()},
+    **{
+        name: spec
+        for kind in (*measures.MEASURES.values(), *measures.OF_COUNTS)
+        for name, spec in kind.variables.items()
+    },
     "status": _flag("how the trajectory ended", STATUSES),
     "spin_final": Variable("float64", SPIN, "final spin n", "Spin at t_stop.", of_sound_runs=True),
-    "spin_error": Variable("float64", SPIN, "estimated error of the final spin", of_sound_runs=True),
+    "spin_error": Variable("float64", SPIN, "estimated error of the final spin",
+                           "Estimated error of spin_final; missing where it is unknown, as after a reversal that grew "
+                           "from round-off.", of_sound_runs=True),
     "sensitive": _flag("is the count sensitive?", {0: "firm", 1: "sensitive"},
                        "Whether different steps give a different number of reversals.", of_sound_runs=True),
     "decided": _flag("is the count certain?", {0: "open", 1: "decided"},

@@ -184,6 +184,8 @@ def _doubts(dataset: xr.Dataset, valid: np.ndarray) -> Iterator[str]:
         yield f"{missed} of {cells} {verb} the tolerance{error}"
     if "decided" in dataset and (open_ := int((valid & (np.ravel(dataset["decided"].values) == 0)).sum())):
         yield f"{counted(open_, 'count is', 'counts are')} uncertain"
+    if "noise_limited" in dataset and (noisy := int((valid & (np.ravel(dataset["noise_limited"].values) == 1)).sum())):
+        yield f"in {counted(noisy, 'cell')} round-off decides when late reversals come: spin errors are unknown there"
 
 
 def accuracy(dataset: xr.Dataset) -> Iterator[str]:

@@ -17,7 +17,7 @@ body: {a: 10.0, b: {start: 2, stop: 5, num: 4}, delta: 0.03}
 friction: {mu: {start: 40, stop: 80, num: 5}}
 start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
 integrator: {method: dopri5, t_end: 1500}
-measure: [reversals, margin, energy_error, noise_limited, resting_spin]
+measure: [reversals, margin, energy_error, resting_spin]
 """
 
 

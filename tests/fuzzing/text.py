@@ -47,7 +47,7 @@ def tree(random: Random) -> list[list[Any]]:
         ["integrator", [["t_end", "1500"], ["method", choose(("dopri5", "auto"))], ["tolerance", "1e-6"]]],
         ["name", "x"], ["max_failed_fraction", "0.01"],
         # As of a run by default, whose kernels are compiled already.
-        ["measure", "[reversals, energy_error, noise_limited]"],
+        ["measure", "[reversals, energy_error, resting_spin]"],
         ["model", choose(("slip", "slip", "noslip", "analytic"))],
     ]  # fmt: skip
     kept = [pair for pair in pairs if pair[0] == "friction" or random.random() < 0.7]

@@ -140,7 +140,7 @@ def test_measurements_without_a_place_in_the_kernel_share_it() -> None:
 
     alone = name("reversals")
     assert name("reversals", "resting_spin") == alone
-    for other in ("energy_error", "reversal_times=3", "noise_limited"):
+    for other in ("energy_error", "reversal_times=3"):
         assert name("reversals", other) != alone
 
 

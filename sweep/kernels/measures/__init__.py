@@ -16,10 +16,14 @@ from sweep.kernels.measures.reversals import Reversals
 from sweep.models.model import Model, Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Reversals, EnergyError, Margin, NoiseLimited, RestingSpin, ReversalTimes, Foreseen,
+    Reversals, EnergyError, Margin, RestingSpin, ReversalTimes, Foreseen,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
+"""The measurements that a configuration can ask for."""
+
+OF_COUNTS: tuple[type[Measurement], ...] = (NoiseLimited, Decay)
+"""The measurements without which a count and its error cannot be judged."""
 
 
 def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
@@ -32,10 +36,10 @@ def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
     )
 
 
-def with_decay(measurements: tuple[Measurement, ...], tier: Tier) -> tuple[Measurement, ...]:
-    """Add `Decay` to `measurements` that include a count which it can make final."""
-    counted = {*Decay.needs} <= {each.name for each in measurements}
-    return (*measurements, Decay()) if counted and Decay.asks in tier.offers else measurements
+def complete(measurements: tuple[Measurement, ...], tier: Tier) -> tuple[Measurement, ...]:
+    """Add to `measurements` those that belong to every count of a model with two rocking modes."""
+    counted = Reversals.name in {each.name for each in measurements}
+    return (*measurements, *(kind() for kind in OF_COUNTS if counted and kind.asks in tier.offers))
 
 
 def possible(tier: Tier) -> tuple[str, ...]:

@@ -29,7 +29,8 @@ NEXT, EVERY = "watch_next", "watch_every"
 
 WOUND, LEFT = "spin_when_wound_down", "windows_left"
 """Results of the last window: the least spin that remains when the rattle has decayed, 0 unless no reversal can come;
-and the number of further windows that it takes to decay at this rate, 0 if its energy has not fallen."""
+and the number of further windows that it takes to decay at this rate, negative if it grows at the expense of the spin,
+and 0 if no energy was lost."""
 
 LOOKS = 256
 """Looks in a window, less one.  Of the roundest bodies of `mu_b` a rattle loses 0.03 % of its energy in a tenth of the
@@ -39,7 +40,8 @@ STEEPER = 8.0
 """The slope of M·u/J33 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
 1/spin.  Then the spin stays away from zero if it would with seven times the slope."""
 
-# A rattle that loses a larger share of its energy in a window is soon small enough for others.
+# A rattle that loses a larger share of its energy in a window is soon small enough for others.  One that gains energy
+# by more than the inverse has taken it from the spin, and the slope does not show how the spin ends.
 _SLOW = 0.5
 
 _WINDOW = ("looks", "first_spin", "first_total", "mean_spin", "mean_total", "sum_squares", "sum_products")
@@ -88,7 +90,8 @@ class Decay(Measurement):
             energy, energy0, slope = total - spin * spin, total0 - spin0 * spin0, products / squares
             end = spin - STEEPER * slope / (1.0 - 2.0 * spin * slope) * energy
             falls = total < total0
-            final = falls & (energy > _SLOW * energy0) & (spin * end > 0.0)
+            steady = (energy > _SLOW * energy0) & (_SLOW * energy < energy0)
+            final = falls & steady & (spin * end > 0.0)
             final = final & stays(group, lane, spin if spin < end else end, end if spin < end else spin)
             if due:
                 group[WATCHED + lane] += group[BETWEEN + lane]

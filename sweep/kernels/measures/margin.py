@@ -12,6 +12,7 @@ For a trajectory that settles, the slow equations give the further course of its
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.measurement import Measurement, measured
-from sweep.kernels.measures.resting_spin import endings
+from sweep.kernels.measures.resting_spin import endings, ends_as_predicted
 from sweep.kernels.status import SETTLED
 from sweep.models.model import COUNT, Array
 from sweep.units import SPIN
@@ -84,18 +85,38 @@ class Margin(Measurement):
         return look
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        settled = table["status"] == SETTLED
-        overshoot, nearest = table["overshoot"], table["nearest_approach"]
-        # Where the slow equations do not apply, the spin hardly changes any more.
-        left = endings(table, settled)
-        further = left.overshoot > overshoot
-        nearest = np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach))
+        arc = last_arc(table, ends_as_predicted(table))
+        nearest = arc.nearest_approach
         if WOUND in table.layout:
             nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
         return {
-            "margin_more": np.where(settled, nearest, np.nan),
-            "margin_fewer": np.where(table["reversals"] > 0, np.fmax(overshoot, left.overshoot), np.nan),
+            "margin_more": np.where(table["status"] == SETTLED, nearest, np.nan),
+            "margin_fewer": np.where(table["reversals"] > 0, arc.overshoot, np.nan),
         }
+
+
+class LastArc(NamedTuple):
+    """The last arcs of averaged spins, arrays of shape (cells,)."""
+
+    reversals: Array
+    """Number of reversals before it."""
+    overshoot: Array
+    nearest_approach: Array
+
+
+def last_arc(table: Table, predicted: Array) -> LastArc:
+    """Find the last arcs of the spins: as recorded, and where `predicted`, as the slow equations continue them.
+
+    Where these do not apply, the spin hardly changes any more.
+    """
+    left = endings(table, predicted)
+    overshoot, nearest = (table[name] if name in table.layout else np.full(len(predicted), np.nan) for name in EXTREMES)
+    further = (left.reversals > 0) | (left.overshoot > overshoot)
+    return LastArc(
+        table["reversals"] + np.nan_to_num(left.reversals),
+        np.where(further, left.overshoot, overshoot),
+        np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach)),
+    )
 
 
 @inline

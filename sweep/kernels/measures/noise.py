@@ -1,5 +1,8 @@
 """Mark cells in which a mode of the rattle fell below the round-off of the other before it grew again.
 
+It cannot be requested: every kernel that counts the reversals of a model with two rocking modes has it, because the
+error of such a cell cannot be estimated (`sweep.engine.errors`).
+
 A mode that has decayed to 1e-16 of the other is filled in by round-off.  When it grows again it grows from noise, and
 the reversal that it causes comes too early.  From one look to the next, the logarithm of each mode's amplitude is
 changed by the growth rate at the mean spin, within the limit set by the energy present.  The depth to which a mode
@@ -46,7 +49,6 @@ class NoiseLimited(Measurement):
     summary = "whether round-off decides the times of late reversals"
     asks = MODES
     needs = ("reversals",)
-    by_default = True
     quantities = (
         *_LOGS, *_DEPTHS, *_RATES, "tracked", "tracked_spin", "tracked_reversals", "noise_limited",
     )  # fmt: skip
@@ -54,7 +56,8 @@ class NoiseLimited(Measurement):
     variables = {
         "noise_limited": measured(
             "int8", NUMBER, "are late times limited by round-off?",
-            "Whether a mode of the rattle fell under the round-off of the other before it grew.",
+            "Whether a mode of the rattle fell under the round-off of the other before it grew: the reversal that it "
+            "causes comes too early, by an unknown time, and spin_final is not known either.",
             flag="noise_limited",
         )
     }  # fmt: skip

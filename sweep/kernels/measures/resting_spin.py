@@ -43,7 +43,17 @@ class RestingSpin(Measurement):
     }  # fmt: skip
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        return {"spin_rest": endings(table, table["status"] == SETTLED).spin}
+        return {"spin_rest": endings(table, ends_as_predicted(table)).spin}
+
+
+def ends_as_predicted(table: Table) -> Array:
+    """Return which trajectories have settled as the slow equations predict, shape (cells,).
+
+    A nearly round body may settle because it was watched (`decay`); if the slow equations then predict a reversal, they
+    do not hold for it.
+    """
+    settled = table["status"] == SETTLED
+    return np.asarray(settled & (endings(table, settled).reversals == 0))
 
 
 def endings(table: Table, which: Array) -> Ending:
