@@ -268,17 +268,21 @@ def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
         sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
         found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a failed companion has the count NaN
     if "margin_more" in found:
-        found["decided"] = _decided(found, errors) & _consistent(job, found)
+        found["decided"] = _decided(found, errors, slows=job.config.equations.slows) & _consistent(job, found)
     return found
 
 
-def _decided(found: Mapping[str, Array], errors: Errors) -> Array:
-    """Return which counts are final and certain, shape (cells,)."""
+def _decided(found: Mapping[str, Array], errors: Errors, *, slows: bool) -> Array:
+    """Return which counts are final and certain, shape (cells,).
+
+    Two runs may agree in one margin by chance, however wrong both are; that they agree in both is less likely. So the
+    larger error counts for both, unless a couple slows the spin, and with it the error of the overshoot.
+    """
     firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
-    # Two margins may agree by chance, however wrong both runs are; that both margins do so is less likely.
-    least = DECIDED * np.fmax(errors.overshoot, errors.nearest_approach)
-    below = (found["reversals"] == 0) | (found["margin_fewer"] > least)
-    return np.asarray(firm & below & (found["margin_more"] > least))
+    larger = np.fmax(errors.overshoot, errors.nearest_approach)
+    below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * larger)
+    above = found["margin_more"] > DECIDED * (errors.nearest_approach if slows else larger)
+    return np.asarray(firm & below & above)
 
 
 def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:
