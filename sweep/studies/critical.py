@@ -1,4 +1,4 @@
-"""Finds critical spins by the paper's formulas, by the model's eigenvalues, and n_c2 by simulation."""
+"""Find critical spins by the paper's formulas, by the model's eigenvalues, and n_c2 by simulation."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import xarray as xr
 from sweep.config import Config, Values
 from sweep.engine.estimate import estimate
 from sweep.grid import Array
+from sweep.kernels.status import SETTLED
 from sweep.models.model import Columns
 from sweep.models.theory.stability import SPIN_LIMIT
 from sweep.parameters import START
@@ -27,6 +28,9 @@ from sweep.studies.study import Search, Task, measuring, require_between, requir
 
 RATIO = 1.25
 """Ratio of successive spins in the outward search."""
+
+# Times that a bracket with uncertain counts is narrowed from outside, each time halving the way to the nearest one.
+_CLOSER = 5
 
 # Number of spins simulated at once in the outward search.
 _OUTWARDS = 5
@@ -72,6 +76,8 @@ class Answer(NamedTuple):
     measured: bool
     """Whether the distance lies on the branch that vanishes smoothly at n_c2."""
     failed: bool
+    certain: bool
+    """Whether the count is certain, or its error is unknown."""
 
 
 @dataclass
@@ -89,26 +95,50 @@ class Spin:
     """The nearest place known to reverse."""
     root: Root | None = None
     """The bracket, once the outward search has found one."""
+    checked: dict[float, bool] = field(default_factory=dict)
+    """Places simulated with estimated errors, and whether they count as the bracket says, with certainty."""
+    closer: int = _CLOSER
+    """Times that the bracket may still be narrowed from outside."""
     reason: int | None = None
     """The result; None while the search goes on."""
 
     def wanted(self) -> list[float]:
         """Return the places to simulate next."""
-        return self.root.wanted() if self.root else self.left[:_OUTWARDS]
+        if not self.root:
+            return self.left[:_OUTWARDS]
+        if self.root.unknown and self.closer:
+            self.closer -= 1
+            return self.root.closer()
+        return self._unchecked() if self.root.ended else self.root.wanted()
 
     def learn(self, answers: list[Answer]) -> None:
         """Record the outcomes at the requested places."""
-        self.reverses = min([self.reverses, *(each.place for each in answers if each.distance > 0)])
+        self.reverses = min([self.reverses, *(each.place for each in answers if each.distance > 0 and each.certain)])
         if self.root:
-            for each in answers:
-                self.root.learn(each.place, each.distance, smooth=each.measured)
+            self.reason = self._narrowed(self.root, answers)
         else:
             self.left = self.left[len(answers) :]
             self.reason = self._outwards(answers)
-        if self.root and self.root.unknown:
-            self.reason = Reason.FAILED if any(each.failed for each in answers) else Reason.NOT_SETTLED
-        elif self.root and self.root.ended:
-            self.reason = Reason.EXISTS
+
+    def _narrowed(self, root: Root, answers: list[Answer]) -> int | None:
+        """Narrow the bracket; return the result once it is narrow, or as narrow as certain counts allow."""
+        for each in answers:
+            before = root.values.get(each.place)
+            self.checked[each.place] = each.certain and (before is None or (before > 0) == (each.distance > 0))
+            root.learn(each.place, each.distance if each.certain else np.nan, smooth=each.measured)
+        if any(each.failed for each in answers):
+            return Reason.FAILED
+        if any(np.isnan(each.distance) for each in answers):
+            return Reason.NOT_SETTLED
+        if root.unknown and self.closer:
+            return None
+        if not (root.unknown or root.ended) or self._unchecked():
+            return None
+        return Reason.EXISTS if self.checked[root.low] and self.checked[root.high] else Reason.NOT_SETTLED
+
+    def _unchecked(self) -> list[float]:
+        """Return the ends of the bracket that were simulated without estimating their errors."""
+        return [end for end in (self.root.low, self.root.high) if end not in self.checked] if self.root else []
 
     def _outwards(self, answers: list[Answer]) -> int | None:
         """Advance until a spin reverses; then set the bracket, or the reason why there is none."""
@@ -149,7 +179,14 @@ class CriticalSpins(Search):
             for side, n_c1 in enumerate(self.prediction.n_c1)
             for body in np.flatnonzero(self.first[side] == Reason.EXISTS).tolist()
         ]
+        sizes = np.abs(self.prediction.n_c1) / config.equations.spin_unit(self.columns)
+        self._slowest = float(sizes[self.first == Reason.EXISTS].min(initial=1.0))
+        """The slowest n_c1 from which a search begins, in sqrt(g/c), or 1."""
         self._asked: list[tuple[Spin, list[float]]] = []
+
+    def sharp(self, width: float) -> float:
+        """Return the tolerance with which brackets are narrowed to a width, relative to the slowest spin."""
+        return super().sharp(width * self._slowest)
 
     def estimate(self) -> str:
         axes = " × ".join(f"{d} {n}" for d, n in zip(self.grid.dims, self.grid.shape, strict=True)) or "one body"
@@ -165,7 +202,7 @@ class CriticalSpins(Search):
         spins = [spin for spin in self.spins if spin.reason is None]
         outwards = [spin for spin in spins if not spin.root]
         if not outwards:
-            self.tolerance = self.sharp(self.width)
+            self.tolerance, self.estimates = self.sharp(self.width), self.config.integrator.estimate_errors
         self._asked = [(spin, spin.wanted()) for spin in outwards or spins]
         body = np.array([spin.body for spin, places in self._asked for _ in places], int)
         n0 = np.array([spin.sign * np.exp(place) for spin, places in self._asked for place in places])
@@ -180,7 +217,8 @@ class CriticalSpins(Search):
         size = np.exp([place for _, places in self._asked for place in places])
         distance = np.where(reversed_ & ~(distance > 0), size, distance)
         failed = ~counts.known & ~reversed_
-        answers = zip(distance.tolist(), measured.tolist(), failed.tolist(), strict=True)
+        certain = (found["status"] != SETTLED) | (found.get("decided", counts.known) == 1)
+        answers = zip(distance.tolist(), measured.tolist(), failed.tolist(), certain.tolist(), strict=True)
         for spin, places in self._asked:
             spin.learn([Answer(place, *next(answers)) for place in places])
 

@@ -1,5 +1,6 @@
 """Critical spins: the eigenvalues against simulation, and n_c2 against runs; of the paper's bodies and of real ones."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,8 +20,11 @@ from sweep.kernels.status import TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.model import Columns, Model, stack
 from sweep.models.theory import linear
-from sweep.results.dataset import REASONS
+from sweep.results.dataset import REASONS, Reason
 from sweep.results.summary import describe
+from sweep.studies.critical import Answer, Spin
+
+Places = list[tuple[float, bool]]
 
 STANDARD = "name: standard\nfriction: {mu: 75}\nintegrator: {t_end: 12000}\n"
 
@@ -92,6 +96,46 @@ def test_brackets_are_as_narrow_as_asked_and_another_method_says_the_same(mu: fl
         assert 0 < ends[1] / ends[0] - 1 < 1.01e-6
         run = sweep.run(write(STANDARD), mu=mu, n0=ends, tolerance=1e-11, method="dopri5")
         assert run.reversals.values.tolist() == [0, 1]
+
+
+def test_an_end_of_a_slow_n_c2_is_as_certain_as_one_of_a_fast_one() -> None:
+    """By SciPy's DOP853 to t = 10500 (relative tolerance 1e-12), the first of these spins does not reverse, and the
+    others do. A tolerance that does not depend on the spin made the last one the inner end."""
+    still, reversing, wrong = 0.00214682, 0.00214875, 0.00214963
+    body = {"a": 12.109548, "b": 7.055028, "delta": -0.084762, "mu": 132.92054, "x0": 0.012290175, "y0": 0.002409336}
+    inner, outer = sweep.critical({}, **body).n_c2_bracket.sel(sign=1).values
+    assert inner < reversing < wrong
+    assert still < outer < inner * 1.0011
+
+
+def searched(reverses: Callable[[float], bool], certain: Callable[[float], bool], width: float) -> tuple[Spin, Places]:
+    """A search whose simulations are replaced by two functions of the spin, and the places that it asks for."""
+    spin, asked = Spin(0, 1.0, width, [float(np.log(1.25**i)) for i in range(9)]), Places()
+    while spin.reason is None:
+        narrowing, answers = spin.root is not None, []
+        for place in spin.wanted():
+            distance, sure = 1.0 if reverses(np.exp(place)) else -1.0, not narrowing or certain(np.exp(place))
+            answers.append(Answer(place, distance, False, False, sure))
+            asked.append((place, narrowing))
+        spin.learn(answers)
+    return spin, asked
+
+
+def test_uncertain_counts_leave_a_wide_bracket_around_them() -> None:
+    spin, _ = searched(lambda n: n > 3.4, lambda n: not 3.3 < n < 3.5, 1e-3)
+    assert spin.reason == Reason.EXISTS
+    low, high = np.exp([spin.root.low, spin.root.high])
+    assert 3.25 < low < 3.3
+    assert 3.5 < high < 3.55
+
+
+@pytest.mark.parametrize("certain", [True, False])
+def test_ends_of_the_outward_search_are_simulated_again(certain: bool) -> None:
+    """A wide bracket is the one that the outward search finds."""
+    spin, asked = searched(lambda n: n > 2.0, lambda _: certain, 0.5)
+    ends = [spin.root.low, spin.root.high]
+    assert [place for place, narrowing in asked if narrowing] == ends
+    assert spin.reason == (Reason.EXISTS if certain else Reason.NOT_SETTLED)
 
 
 def test_n_c2_is_the_first_boundary_along_n0(write: Write) -> None:
