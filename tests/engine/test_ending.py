@@ -11,8 +11,8 @@ from support.kernels import default_measures
 from support.runs import in_sittings, run_cells, same_numbers
 
 import sweep
+from sweep.kernels.measures.reversals import Reversals
 from sweep.kernels.status import SETTLED, TIME_LIMIT
-from sweep.models.theory import rocking
 
 SCENE = {
     "name": "late", "cases": {"mu": [106.09, 130, 75], "b": [2.322, 9.8, 3]}, "body": {"a": 10.0, "delta": 0.03},
@@ -181,8 +181,42 @@ def test_the_spin_of_a_nearly_round_body_reverses_once() -> None:
     assert (found.decided == 1).all()
 
 
+QUICK = [
+    (16.01224245, 1.00001705246, 0.124096559, 160.139144, 0.0768349043),
+    (16.88874322, 1.00007295056, 0.227001132, 52.5499891, 0.0832656665),
+    (13.92985626, 1.00236734583, 0.193787675, 57.6504173, 0.0846982491),
+    (18.54757716, 1.00270211820, 0.211952389, 565.948581, 0.0740555402),
+]
+"""Bodies whose spin reverses within a few periods of the faster mode: (a, b, δ, μ, n0)."""
+
+
+def test_a_reversal_within_the_first_window_counts() -> None:
+    """The sign of the spin at the end differs from that at the start, so the count is odd."""
+    cells = [dict(zip(("a", "b", "delta", "mu", "n0"), cell, strict=True)) for cell in QUICK]
+    found = run_cells(cells)
+    assert (found.spin_final < 0).all()
+    assert (found.reversals == 1).all()
+    assert (found.t_last_reversal > 0).all()
+
+
+SLOW_RIPPLE = {
+    "a": 38.2869031353, "b": 1.34495088526, "c": 0.732594252927, "delta": 0.415215784635, "mu": 1.02181473458,
+    "n0": -0.055030349582, "x0": 0.742100712613, "y0": -0.122584293316,
+}  # fmt: skip
+"""The periods of its modes differ by a factor of 96, and its spin passes slowly through zero, with ripples of half the
+slower period."""
+
+
+@pytest.mark.parametrize("method", ["adams", "dopri5"])
+def test_ripples_of_a_slow_mode_are_not_counted(method: str) -> None:
+    cell = {"cases": {name: [value] for name, value in SLOW_RIPPLE.items()} | {"sigma": [2.57275e-6]}}
+    found = sweep.run(cell, method=method)
+    assert (found.reversals.item(), found.decided.item()) == (1, 1)
+
+
 def test_a_count_of_the_wrong_parity_is_not_decided(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rocking, "LONGEST", np.inf)
+    start = Reversals.start
+    monkeypatch.setattr(Reversals, "start", lambda *args: {**start(*args), "first_spin": 0.0})
     found = sweep.run(NEARLY_ROUND, b=1.00001)
     assert (found.reversals.item(), found.spin_final.item() < 0, found.decided.item()) == (0, True, 0)
 

@@ -2,7 +2,11 @@
 
 The ripple-free spin n* (`sweep.models.theory.ripple`) is the spin without the ripple that the rattle imposes on it.  A
 window is as long as a period of the slower rocking, and the first begins at t = 0.  The time of a reversal is where the
-straight line between two successive averages, each placed at the centre of its window, crosses zero.
+straight line between two successive averages, each placed at the centre of its window, crosses zero.  The average
+before the first is the spin at the start, so that an odd count means another sign of the spin at the end.
+
+Windows may be long compared with the faster rocking.  If the faster mode turns the spin within a window, only the
+slower one can turn it back, which takes longer than its own period.
 
 The same is counted in windows that begin half a period later.  If the two counts differ, that of the trajectory is
 marked: it depends on where the windows begin.  Both kinds of window consist of halves, and each half is summed once.
@@ -29,7 +33,7 @@ class Reversals(Measurement):
     follows = frozenset({RIPPLE})
     quantities = (
         "period", "phase", "half", "earlier_half", "shifted", "closed_window", "closed_shifted",
-        "reversals", "reversals_shifted", "last_reversal",
+        "reversals", "reversals_shifted", "last_reversal", "first_spin",
     )  # fmt: skip
 
     variables = {
@@ -46,10 +50,13 @@ class Reversals(Measurement):
     }  # fmt: skip
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
-        return {"period": model.slower_period(columns), "shifted": 1.0, "last_reversal": np.nan}
+        spin, _, _ = model.energy(model.start(columns), model.constants.of(columns))
+        return {
+            "period": model.slower_period(columns), "shifted": 1.0, "last_reversal": np.nan, "first_spin": spin,
+        }  # fmt: skip
 
     def make_step(self, layout: Layout, at_reversal):
-        PERIOD, PHASE, HALF, EARLIER, SHIFTED, CLOSED, CLOSED_SHIFTED, COUNT, COUNT_SHIFTED, LAST = map(
+        PERIOD, PHASE, HALF, EARLIER, SHIFTED, CLOSED, CLOSED_SHIFTED, COUNT, COUNT_SHIFTED, LAST, FIRST = map(
             layout.at, self.quantities
         )
 
@@ -67,10 +74,14 @@ class Reversals(Measurement):
             closed = earlier + (half - after)
             main, other = closes & (shifted == 0.0), closes & (shifted != 0.0)
             previous, previous_shifted = group[CLOSED + lane], group[CLOSED_SHIFTED + lane]
-            reverses = main & (closed * previous < 0.0)
-            crossing = taken.now - 0.5 * h - over - period * (0.5 + closed / (closed - previous))
+            # At the first window the spin at the start stands for the average before it, half a window away.
+            before = previous if previous != 0.0 else period * group[FIRST + lane]
+            before_shifted = previous_shifted if previous_shifted != 0.0 else group[FIRST + lane]
+            reverses = main & (closed * before < 0.0)
+            share = closed / (closed - before) * (1.0 if previous != 0.0 else 0.5)
+            crossing = taken.now - 0.5 * h - over - period * (0.5 + share)
             group[COUNT + lane] += 1.0 if reverses else 0.0
-            group[COUNT_SHIFTED + lane] += 1.0 if other & (closed * previous_shifted < 0.0) else 0.0
+            group[COUNT_SHIFTED + lane] += 1.0 if other & (closed * before_shifted < 0.0) else 0.0
             group[LAST + lane] = crossing if reverses else group[LAST + lane]
             at_reversal(group, lane, reverses, group[COUNT + lane], crossing)
             group[CLOSED + lane] = closed if main else previous

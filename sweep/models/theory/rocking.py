@@ -18,9 +18,9 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.model import Array
 
-LONGEST = 10.0
+LONGEST = 1000.0
 """Ratio of the two periods of the rocking beyond which the spin is averaged over a shorter time than the longer one.
-Bodies with b > 1.04 c have a smaller ratio (a = 10); none of the configurations has a larger one."""
+Bodies with b > 1.00001 c have a smaller ratio (a = 10)."""
 
 Rocking = namedtuple("Rocking", "B11 B12 B21 B22 C11 C12 C21 C22")
 """The elements of B and C."""
@@ -41,8 +41,8 @@ def frequencies(of: Rocking) -> tuple[Array, Array]:
 def longer_period(of: Rocking) -> Array:
     """Return the period over which the spin is averaged, shape (cells,): that of the slower mode.
 
-    In a body that is nearly round about one axis, the slower mode hardly swings back: its period may outlast the whole
-    motion, and reversals would vanish in the average.  So it is at most `LONGEST` periods of the faster mode.
+    In a body that is nearly round about one axis the slower mode hardly swings back, and its period has no limit.  So
+    it is at most `LONGEST` periods of the faster mode.
     """
     lower, higher = frequencies(of)
     with np.errstate(divide="ignore"):
