@@ -23,6 +23,8 @@ class Variable:
     """Meaning in a sentence, if the `long_name` is not enough."""
     flags: Mapping[int, str] | None = None
     """Meaning of each value, for a variable that takes only a few integer values."""
+    masks: bool = False
+    """Whether the values of `flags` are bits that may be set together."""
     per_body: bool = False
     """Whether it has one value per body, that is, does not depend on the parameters of the start."""
     along: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ from sphinx.util.docutils import SphinxDirective
 import sweep
 from sweep.config import messages, schema
 from sweep.kernels import measures, methods
-from sweep.kernels.status import FAILURES
+from sweep.kernels.status import COUNT_DOUBTS, FAILURES
 from sweep.models import MODELS, TIERS
 from sweep.models.model import Model
 from sweep.parameters import PARAMETERS, SI_ALONE, Parameter
@@ -77,9 +77,19 @@ def _variables() -> tuple[Row, list[Row]]:
     rows = []
     for over, table in tables.items():
         for name, spec in table.items():
-            flags = f" ({', '.join(f'{code} {flag}' for code, flag in spec.flags.items())})" if spec.flags else ""
-            rows.append((f"`{name}`", spec.dtype, over, _unit(spec), (spec.description or spec.long_name) + flags))
+            meaning = spec.description or spec.long_name
+            if spec.flags and not spec.masks:
+                meaning += f" ({', '.join(f'{code} {flag}' for code, flag in spec.flags.items())})"
+            rows.append((f"`{name}`", spec.dtype, over, _unit(spec), meaning))
     return ("variable", "type", "axes", "unit", "meaning"), rows
+
+
+def _doubts() -> tuple[Row, list[Row]]:
+    rows = [
+        (str(int(bit)), f"`{name}`", words, "yes" if bit in COUNT_DOUBTS else "no")
+        for bit, (name, words) in dataset.DOUBTS.items()
+    ]
+    return ("bit", "flag", "meaning", "against the count"), rows
 
 
 _STATUS_MEANINGS = {
@@ -157,6 +167,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         ("settings", _settings),
         ("variables", _variables),
         ("statuses", _statuses),
+        ("doubts", _doubts),
         ("measurements", _measurements),
         ("methods", _methods),
         ("models", _models),

@@ -36,12 +36,12 @@ from sweep.engine.failures import MOST_STEPS
 from sweep.engine.plan import TOLERANCE_TIME, Plan
 from sweep.grid import Array
 from sweep.kernels.measures.margin import last_arc
-from sweep.kernels.measures.noise import NoiseLimited
+from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import ends_as_predicted
 from sweep.kernels.measures.reversals import Reversals
 from sweep.kernels.method import MISSED, REPEAT
 from sweep.kernels.methods import METHODS
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED
+from sweep.kernels.status import COUNT_DOUBTS, FAILURES, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.model import stack
 
 ROUNDS = 3
@@ -69,7 +69,7 @@ OF_RATTLE = 1 / 20
 wide cells was off by five times the tolerance unnoticed. Where no other estimate applies, this is the least reported
 error."""
 
-DECIDED = 10.0
+CLEAR = 10.0
 """Required ratio of the margin of a count to its estimated error: about one in a hundred estimates is more than ten
 times too small (docs/explanation/accuracy.md)."""
 
@@ -165,7 +165,7 @@ def allowed(part: Cells) -> Array:
 
 def limited_by_noise(part: Cells) -> Array:
     """Return in which cells a reversal grew from round-off, shape (cells,)."""
-    return np.asarray(part.recorded(NoiseLimited.name) > 0)
+    return np.asarray(part.recorded(RoundOff.name) > 0)
 
 
 def imbalance(part: Cells) -> Array:
@@ -257,32 +257,45 @@ def _ratio(part: Cells) -> Array:
 def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
     """Collect the simulated variables of `job` by name, over all cells, with accuracies where cells were run twice."""
     found = job.results()
-    if not any(part.rules.twice for part in job.parts):
-        return found
+    counted, twice = "reversals" in found, any(part.rules.twice for part in job.parts)
+    against = {Doubt.TIME_LIMIT: found["status"] == TIME_LIMIT} if counted else {}
+    if twice:
+        against |= _estimated(job, lives, found)
+    for bit, where in against.items():
+        found["doubts"] |= bit * where
+    sound = np.isin(found["status"], (SETTLED, TIME_LIMIT))
+    found["doubts"][~sound] = 0
+    if Doubt.MARGIN in against:
+        found["certain"] = sound & (found["doubts"] & COUNT_DOUBTS == 0)
+    return found
+
+
+def _estimated(job: Plan, lives: Sequence[Lives], found: dict[str, Array]) -> dict[Doubt, Array]:
+    """Add the errors of cells that were run twice to `found`; return which cells they give reason to doubt."""
     errors = Errors(*np.full((len(Errors._fields), len(found["status"])), np.nan))
     for each in lives:
         for whole, part in zip(errors, errors_of(each), strict=True):
             whole[each.cells.cells] = part
-    found["spin_error"] = np.where(found.get(NoiseLimited.name, 0), np.nan, errors.reported)
+    found["spin_error"] = np.where(found["doubts"] & Doubt.ROUND_OFF, np.nan, errors.reported)
+    against = {Doubt.TOLERANCE: found["step_rule"] == MISSED}
     if "reversals" in found:
-        sound = ~np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
-        found["sensitive"] = sound & (errors.reversals != found["reversals"])  # a failed companion has the count NaN
+        against[Doubt.STEP] = errors.reversals != found["reversals"]  # a failed companion has the count NaN
     if "margin_more" in found:
-        found["decided"] = _decided(found, errors, slows=job.config.equations.slows) & _consistent(job, found)
-    return found
+        clear = _clear(found, errors, slows=job.config.equations.slows)
+        against[Doubt.MARGIN] = (found["status"] == SETTLED) & ~clear
+        against[Doubt.PARITY] = ~_consistent(job, found)
+    return against
 
 
-def _decided(found: Mapping[str, Array], errors: Errors, *, slows: bool) -> Array:
-    """Return which counts are final and certain, shape (cells,).
+def _clear(found: Mapping[str, Array], errors: Errors, *, slows: bool) -> Array:
+    """Return where both margins of a count are larger than ten times their errors, shape (cells,).
 
     Two runs may agree in one margin by chance, however wrong both are; that they agree in both is less likely. So the
     larger error counts for both, unless a couple slows the spin, and with it the error of the overshoot.
     """
-    firm = (found["sensitive"] == 0) & (found["window_dependent"] == 0) & (found["status"] == SETTLED)
     larger = np.fmax(errors.overshoot, errors.nearest_approach)
-    below = (found["reversals"] == 0) | (found["margin_fewer"] > DECIDED * larger)
-    above = found["margin_more"] > DECIDED * (errors.nearest_approach if slows else larger)
-    return np.asarray(firm & below & above)
+    below = (found["reversals"] == 0) | (found["margin_fewer"] > CLEAR * larger)
+    return np.asarray(below & (found["margin_more"] > CLEAR * (errors.nearest_approach if slows else larger)))
 
 
 def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:

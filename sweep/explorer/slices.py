@@ -133,6 +133,8 @@ class Source:
             return labels.number(values[0]) if values[0] <= 0 else f"+{values[0]}"
         if flags := labels.flag_words(cell, name):
             return ", ".join(flags.get(int(v), str(v)) for v in values)
+        if "flag_masks" in cell[name].attrs:
+            return ", ".join(labels.flags_set(cell[name])) or "none"
         finite = [labels.number(v) for v in values if np.isfinite(v)]
         return f"{', '.join(finite)} {labels.unit(cell, name)}".strip() if finite else "none"
 

@@ -128,7 +128,7 @@ TILES = {
     "impossible": _tile(6, lambda _, y: np.where(y == 0, _DARK, _LIGHT)),
     "no_value": _tile(1, lambda x, _: 0 * x + _LIGHT),
     "time_limit": _tile(10, lambda x, y: _lines((x + y) % 10)),
-    "noise_limited": _tile(8, lambda _, y: _lines(y)),
+    "round_off": _tile(8, lambda _, y: _lines(y)),
 }
 assert [*TILES, "uncertain"] == list(marks.WORDS)  # drawn as a dot
 

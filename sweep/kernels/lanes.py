@@ -186,7 +186,7 @@ def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: boo
     A couple that `slows` the spin can carry it out of an outer range into one where the rattle grows, or below what is
     left of a rattle that decays more slowly.  With such a couple a trajectory has settled only within the share of the
     inner range in `STABLE` (`sweep.models.theory.stability`), or when no rattle is left.  Without this rule, 35 of 445
-    decided counts of a draw with strong couples were false.
+    certain counts of a draw with strong couples were false.
     """
     FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO, SHARE = map(layout.at, STABLE)
 

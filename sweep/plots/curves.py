@@ -30,7 +30,7 @@ _STYLES: dict[str, dict[str, Any]] = {
     "impossible": {"marker": "_", "color": "0.6"},
     "no_value": {"marker": "|", "color": "0.6"},
     "time_limit": {"marker": "^", "color": "C0", "fillstyle": "none", "markersize": 8},
-    "noise_limited": {"marker": "D", "color": "0.3", "fillstyle": "none", "markersize": 9, "markeredgewidth": 0.6},
+    "round_off": {"marker": "D", "color": "0.3", "fillstyle": "none", "markersize": 9, "markeredgewidth": 0.6},
     "uncertain": {"marker": "o", "color": "black", "markersize": 2},
 }
 """Markers of variables, and of the kinds of cell, drawn around those of the first variable."""

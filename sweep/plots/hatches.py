@@ -22,7 +22,7 @@ GROUNDS: dict[str, dict[str, Any]] = {
 }
 """Colours of the kinds of cell without a result, which no scale uses."""
 
-HATCHES = {"time_limit": "////", "noise_limited": "||||"}
+HATCHES = {"time_limit": "////", "round_off": "||||"}
 
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "white", "markeredgecolor": "black"}
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from sweep.parameters import PARAMETERS, Parameter
@@ -72,6 +73,12 @@ def flag_words(dataset: xr.Dataset, name: str) -> dict[int, str]:
     elif values == [0, 1] and words(dataset, name).endswith("?"):
         meanings = {0: "no", 1: "yes"}
     return {value: meanings.get(value, str(value)).replace("_", " ") for value in values}
+
+
+def flags_set(bits: xr.DataArray) -> list[str]:
+    """Return the words for the flags that are set in one value of a variable with `flag_masks`."""
+    meanings = zip(np.atleast_1d(bits.attrs["flag_masks"]), str(bits.attrs["flag_meanings"]).split(), strict=True)
+    return [words.replace("_", " ") for mask, words in meanings if int(bits) & int(mask)]
 
 
 def is_code(flags: xr.DataArray) -> bool:

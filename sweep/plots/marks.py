@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT, Doubt
 from sweep.plots.labels import is_code
 from sweep.plots.quantities import DERIVED, field
-from sweep.results.dataset import STATUS_WORDS, VARIABLES
+from sweep.results.dataset import STATUS_WORDS, VARIABLES, uncertain
 
 WORDS = {
     "not_run": "not run",
@@ -20,7 +20,7 @@ WORDS = {
     "impossible": "impossible body",
     "no_value": "no value",
     "time_limit": "lower bound: time limit",
-    "noise_limited": "limited by round-off",
+    "round_off": "limited by round-off",
     "uncertain": "uncertain count",
 }
 """The kinds of cell, and their meanings.  A cell may be of several kinds, but only one of the first four."""
@@ -68,7 +68,7 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     not_run, failed = among("status", 0), among("status", *FAILURES)
     impossible, missing = among("status", IMPOSSIBLE), found.isnull()
     sound = ~(not_run | failed | impossible)
-    settled_open = among("status", SETTLED) & among("decided", 0)
+    known = simulated and all(name in dataset and is_code(dataset[name]) for name in ("status", "doubts"))
     grows, limited = name in _GROWING, name in _GROWING or (name, "time_limit") in _PER_VARIABLE
     return {
         "not_run": not_run,
@@ -76,8 +76,8 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
         "impossible": impossible,
         "no_value": missing & sound,
         "time_limit": among("status", TIME_LIMIT) & ~missing & limited,
-        "noise_limited": among("noise_limited", 1) & sound,
-        "uncertain": (among("sensitive", 1) | among("window_dependent", 1) | settled_open) & sound & grows,
+        "round_off": none | (sound & (dataset["doubts"] & int(Doubt.ROUND_OFF) > 0) if known else False),
+        "uncertain": none | (uncertain(dataset) if known and grows else False),
     }
 
 

@@ -15,6 +15,7 @@ from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
+from sweep.kernels.status import COUNT_DOUBTS, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.units import NUMBER, PAPER_UNITS, SPIN, TIME
@@ -50,6 +51,20 @@ class Reason(IntEnum):
 REASONS = {int(reason): reason.name.lower() for reason in Reason}
 """The flags of variables that hold a `Reason`."""
 
+DOUBTS = {
+    Doubt.TIME_LIMIT: ("not_final", "the time limit came first, so more reversals may follow."),
+    Doubt.STEP: ("depends_on_step", "with longer steps the number of reversals is another one."),
+    Doubt.WINDOWS: ("depends_on_windows", "with averages over other windows the number of reversals is another one."),
+    Doubt.PARITY: ("contradicts_spin", "the sign of the final spin does not match the number of reversals."),
+    Doubt.MARGIN: ("close_to_another", "a margin is smaller than ten times its error, so another count is possible."),
+    Doubt.ROUND_OFF: (
+        "round_off",
+        "round-off decides the times of late reversals, so these and the final spin are unknown.",
+    ),
+    Doubt.TOLERANCE: ("misses_tolerance", "the estimated error of the final spin exceeds the tolerance."),
+}
+"""Names and sentences of the flags of `doubts`."""
+
 ROWS = {CASE: "Row of the table of cases.", SAMPLE: "Number of the sample."}
 """The meaning of the index along the rows of a table."""
 
@@ -82,11 +97,11 @@ VARIABLES: dict[str, Variable] = {
     "spin_error": Variable("float64", SPIN, "estimated error of the final spin",
                            "Estimated error of spin_final; missing where it is unknown, as after a reversal that grew "
                            "from round-off.", of_sound_runs=True),
-    "sensitive": _flag("is the count sensitive?", {0: "firm", 1: "sensitive"},
-                       "Whether different steps give a different number of reversals.", of_sound_runs=True),
-    "decided": _flag("is the count certain?", {0: "open", 1: "decided"},
-                     "Whether the number of reversals is final, with margins larger than ten times their errors.",
-                     of_sound_runs=True),
+    "certain": _flag("is the count certain?", {0: "uncertain", 1: "certain"},
+                     "Whether the number of reversals is final, with margins larger than ten times their errors; the "
+                     "reasons against it are in doubts.", of_sound_runs=True),
+    "doubts": _flag("reasons for doubt", {int(bit): name for bit, (name, _) in DOUBTS.items()},
+                    " ".join(f"{name}: {words}" for name, words in DOUBTS.values()), of_sound_runs=True, masks=True),
     "t_stop": Variable("float64", TIME, "time of the end", "Time at which the simulation ended."),
     "method": _flag("integration method", {each.code: name for name, each in METHODS.items()}),
     "step": Variable("float64", TIME, "integration step"),
@@ -114,9 +129,11 @@ def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, A
     table = kernel.table(images)
     times = kernel.times(images, t_end)
     result = {"status": table["status"], "spin_final": kernel.spins(images), "t_stop": times, "step": table["step"]}
+    doubts: Array = np.zeros(len(images), int)
     for each in kernel.measurements:
         result |= each.read(table, times)
-    return result
+        doubts |= each.doubts(table)
+    return result | {"doubts": doubts}
 
 
 def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: Mapping[str, Any]) -> xr.Dataset:
@@ -176,6 +193,15 @@ def along_one(dataset: xr.Dataset) -> xr.Dataset:
     return found.transpose(TRAJECTORIES, ...)
 
 
+def uncertain(dataset: xr.Dataset) -> xr.DataArray:
+    """Return a mask of the cells whose count is not certain: it may not be final, or another one is possible.
+
+    Cells without a count, which failed or are impossible, are not among them.
+    """
+    counted = dataset["status"].isin((SETTLED, TIME_LIMIT))
+    return counted & (dataset["doubts"] & int(COUNT_DOUBTS) > 0)
+
+
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise a `InputError` if a parameter has the name of a variable or dimension, or of one of these `series`."""
     own = {*VARIABLES, *PROBABILITIES, *ROWS, *FURTHER, *series}
@@ -230,6 +256,6 @@ def described(spec: Variable, system: str = PAPER_UNITS) -> dict[str, Any]:
     """Return the CF attributes of a variable in a system of units."""
     words: dict[str, Any] = {**attributes(spec, system)}
     if spec.flags:
-        words["flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
+        words["flag_masks" if spec.masks else "flag_values"] = np.array(list(spec.flags), dtype=spec.dtype)
         words["flag_meanings"] = " ".join(spec.flags.values())
     return words

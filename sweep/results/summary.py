@@ -11,8 +11,8 @@ import xarray as xr
 
 from sweep.faults import counted, duration
 from sweep.kernels.method import MISSED, STEP_RULES
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT
-from sweep.results.dataset import REASONS, STATUSES, TRAJECTORIES, along_one
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
+from sweep.results.dataset import REASONS, STATUSES, TRAJECTORIES, along_one, uncertain
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, UNCERTAIN, WIDE
 from sweep.results.probabilities import PROBABILITIES
@@ -71,7 +71,7 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     if pairs := int(dataset.attrs.get("pairs_not_searched", 0)):
         yield f"not searched {pairs}: pairs of neighbours whose counts differ, where a count is not final or missing"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
-        yield f"uncertain {uncertain}: the count at one end is not decided; its error may reach the other count"
+        yield f"uncertain {uncertain}: the count at one end is not certain; its error may reach the other count"
 
 
 def _fit(dataset: xr.Dataset) -> Iterator[str]:
@@ -167,25 +167,53 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
     valid = np.isin(status, (SETTLED, TIME_LIMIT))
     counts = f"; {_reversals(dataset, valid)}" if "reversals" in dataset and valid.any() else ""
     yield f"{_count(dataset['status'], 'cell')}: {ends or 'status unknown'}{counts}"
-    if doubts := [*_doubts(dataset, valid)]:
-        yield "; ".join(doubts)
     if "impossible" in dataset.attrs:
         yield f"impossible: {dataset.attrs['impossible']}"
     if "probability" in dataset and dataset["probability"].dims == ("count",):
         yield f"probability: {', '.join(_probabilities(dataset))}"
+    if "doubts" in dataset and dataset["doubts"].dtype.kind in "iu" and valid.any():
+        yield from _doubts(dataset, int(valid.sum()))
 
 
-def _doubts(dataset: xr.Dataset, valid: np.ndarray) -> Iterator[str]:
-    """Say which cells need a look."""
-    cells = counted(valid.size, "cell")
-    if "step_rule" in dataset and (missed := int((dataset["step_rule"] == MISSED).sum())):
-        verb = "misses" if missed == 1 else "miss"
+_REMEDIES = {
+    Doubt.TIME_LIMIT: ("not settled at the time limit", "raise t_end"),
+    Doubt.STEP: ("different with a longer step", "lower the tolerance"),
+    Doubt.MARGIN: ("within ten times the error of another count", "lower the tolerance"),
+    Doubt.WINDOWS: ("different with averages over other windows", "look at the trajectory"),
+    Doubt.PARITY: ("at odds with the sign of the final spin", "look at the trajectory"),
+}
+"""Words for each reason against a count, and what to do about it; a count is listed with the first that applies."""
+
+
+def _doubts(dataset: xr.Dataset, counts: int) -> Iterator[str]:
+    """Say how many of the counts are certain, where the others lie and what to do, and which errors are large."""
+    left, doubts = uncertain(dataset), dataset["doubts"]
+    if missed := int((doubts & int(Doubt.TOLERANCE) > 0).sum()):
         error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
-        yield f"{missed} of {cells} {verb} the tolerance{error}"
-    if "decided" in dataset and (open_ := int((valid & (np.ravel(dataset["decided"].values) == 0)).sum())):
-        yield f"{counted(open_, 'count is', 'counts are')} uncertain"
-    if "noise_limited" in dataset and (noisy := int((valid & (np.ravel(dataset["noise_limited"].values) == 1)).sum())):
+        yield f"{missed} of {counted(counts, 'cell')} {'misses' if missed == 1 else 'miss'} the tolerance{error}"
+    if "certain" in dataset:
+        others = "; the others:" if left.any() else ""
+        yield f"{counts - int(left.sum())} of {counted(counts, 'count is', 'counts are')} certain{others}"
+    elif left.any():
+        yield f"{int(left.sum())} of {counted(counts, 'count is', 'counts are')} uncertain:"
+    for bit, (words, remedy) in _REMEDIES.items():
+        these = left & (doubts & int(bit) > 0)
+        left &= ~these
+        if these.any():
+            yield f"  {int(these.sum())} {words}{_place(these)}: {remedy}"
+    if noisy := int((doubts & int(Doubt.ROUND_OFF) > 0).sum()):
         yield f"in {counted(noisy, 'cell')} round-off decides when late reversals come: spin errors are unknown there"
+
+
+def _place(where: xr.DataArray) -> str:
+    """Describe where on the axes the cells of a mask lie; "" if they are spread over all of them."""
+    ranges = []
+    for name in (str(dim) for dim in where.dims if where.sizes[dim] > 1 and dim in where.coords):
+        values = np.sort(where[name].values[where.any([dim for dim in where.dims if dim != name])])
+        if len(values) < where.sizes[name] and values.dtype.kind in "iuf":
+            low, high = values[0], values[-1]
+            ranges.append(f"{name} = {low:g}" if low == high else f"{name} = {low:g} to {high:g}")
+    return f", at {', '.join(ranges)}" if ranges else ""
 
 
 def accuracy(dataset: xr.Dataset) -> Iterator[str]:

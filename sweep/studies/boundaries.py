@@ -142,7 +142,7 @@ class Boundaries(Search):
             self._grid["cells_not_final"] = int((found["status"] == TIME_LIMIT).sum())
             self.curves = list(self._curves(counts))
             return
-        sure = found.get("decided", counts.known)
+        sure = found.get("certain", counts.known)
         levels = np.array([curve.level for curve, *_ in self._asked])
         cells = map(Cell, counts.distance(levels), counts.reversals, sure, counts.borders(levels))
         for (_, each, place), cell in zip(self._asked, cells, strict=True):
@@ -204,7 +204,7 @@ class Boundaries(Search):
     def _edge(self, known: tuple[Array, ...], at: tuple[float, float], others: dict[str, float]) -> Point:
         """Return the point on the edge at `at`, in indices along x and y, one of which is whole.
 
-        `known` holds distances, counts, and masks of decided and measured cells, of shape (y, x).
+        `known` holds distances, counts, and masks of certain and measured cells, of shape (y, x).
         """
         x, y = self.across
         horizontal = abs(at[0] - round(at[0])) > abs(at[1] - round(at[1]))

@@ -36,7 +36,7 @@ class Cell(NamedTuple):
     distance: float
     """Distance from the boundary, in spin; NaN if there is no count."""
     reversals: int
-    decided: bool
+    certain: bool
     """Whether the count is certain, or its error is unknown."""
     measured: bool
     """Whether the distance is measured, and not estimated."""
@@ -99,8 +99,8 @@ class Point(Line):
         cells = [self.cells[place] for place in ends]
         fewer, more = (self.parameters(place) for place in ends)
         name = self.along.name
-        decided = all(cell.decided for cell in cells) and cells[1].distance > 0 >= cells[0].distance
-        sure = FOUND if decided else UNCERTAIN
+        certain = all(cell.certain for cell in cells) and cells[1].distance > 0 >= cells[0].distance
+        sure = FOUND if certain else UNCERTAIN
         row: dict[str, Any] = {"end_fewer": fewer[name], "end_more": more[name], "bracket": name}
         row |= {"outcome": WIDE if root.unknown else sure}
         row |= {"reversals_fewer": cells[0].reversals, "reversals_more": cells[1].reversals}

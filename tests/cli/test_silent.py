@@ -10,6 +10,7 @@ from support.cli import invoke
 
 import sweep
 from sweep.config import InputError
+from sweep.kernels.status import Doubt
 
 GRID = {"name": "quick", "friction": {"mu": [40.0, 60.0, 80.0, 100.0, 120.0]}, "start": {"n0": [0.02, 0.05]}}
 TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05]}\nintegrator: {t_end: 40}\n"
@@ -93,14 +94,21 @@ def test_words_agree_with_their_number() -> None:
     assert summary(**one) == "1 cell: 1 time_limit\nstep: 0.5 to 0.5, set by accuracy in 1 cell"
 
 
-def test_one_line_says_the_result_and_the_next_what_needs_a_look() -> None:
+def test_the_last_lines_of_a_run_say_which_counts_are_certain_and_what_to_do_about_the_others() -> None:
     """Cells that miss the tolerance do not count for the rule that set the step."""
-    rules = {"status": ("mu", np.full(4, 2, "int8")), "step": ("mu", [1.0, 2, 3, 4]), "step_rule": ("mu", [1, 4, 4, 3])}
-    counts = {"reversals": ("mu", [1, 2, 2, 5]), "reversals_predicted": ("mu", [1, 2, 3, 1])}
-    errors = {"spin_error": ("mu", [1e-9, 2e-3, np.nan, 1e-9]), "decided": ("mu", [1, 0, 1, 1])}
+    rules = {"step": ("mu", [1.0, 2, 3, 4]), "step_rule": ("mu", [1, 4, 4, 3])}
+    counts = {"status": ("mu", np.array([1, 1, 2, 1], "int8")), "reversals": ("mu", [1, 2, 2, 5])}
+    counts |= {"reversals_predicted": ("mu", [1, 2, 3, 1])}
+    bits = [0, Doubt.TOLERANCE | Doubt.STEP, Doubt.TOLERANCE | Doubt.TIME_LIMIT, 0]
+    doubts = {"certain": ("mu", [1, 0, 0, 1]), "doubts": ("mu", bits)}
+    errors = {"spin_error": ("mu", [1e-9, 2e-3, np.nan, 1e-9]), "mu": [10.0, 20.0, 30.0, 40.0], **doubts}
     assert summary(**rules, **counts, **errors).splitlines() == [
-        "4 cells (mu 4): 4 time_limit; 1 to 5 reversals, as predicted in 50.0% of the cells, within one in 75.0%",
-        "2 of 4 cells miss the tolerance: spin errors up to 2.0e-03; 1 count is uncertain",
+        "4 cells (mu 4): 3 settled, 1 time_limit; 1 to 5 reversals, "
+        "as predicted in 50.0% of the cells, within one in 75.0%",
+        "2 of 4 cells miss the tolerance: spin errors up to 2.0e-03",
+        "2 of 4 counts are certain; the others:",
+        "  1 not settled at the time limit, at mu = 30: raise t_end",
+        "  1 different with a longer step, at mu = 20: lower the tolerance",
         "spin error: median 1.0e-09, largest 2.0e-03, as estimated",
         "step: 1 to 4, set by accuracy in 1 cell, repeat in 1 cell",
     ]

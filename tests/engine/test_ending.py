@@ -32,7 +32,7 @@ def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset) -> None:
     assert list(run.status) == [SETTLED, SETTLED, SETTLED]
     assert list((run.reversals - ended.reversals).values) == [1, 0, 0]
     assert float(run.t_last_reversal[0]) > 30_000
-    assert list(run.decided[1:]) == [1, 1]  # the first grew from round-off, so it depends on the CPU whether it is
+    assert list(run.certain[1:]) == [1, 1]  # the first grew from round-off, so it depends on the CPU whether it is
 
 
 def test_to_have_paused_changes_no_count(run: xr.Dataset) -> None:
@@ -50,7 +50,7 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
     cells = [dict(zip(STANDARD, row, strict=True)) for row in rows]
     found = run_cells(cells, t_end=3000.0)
     assert list(found.reversals) == [1, 3]
-    assert list(found.decided) == [1, 1]
+    assert list(found.certain) == [1, 1]
     paper = {"name": "one", "friction": {"mu": 60.0}}
     ends = [sweep.trajectory(paper, at=cell, stop_early=True, t_end=600.0) for cell in cells]
     assert [int(each.reversals) for each in ends] == [1, 3]
@@ -70,7 +70,7 @@ def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
     """Its companion, in longer steps, closes a single window before the same time."""
     found = sweep.run(ROOT / "configs" / "kane_levinson_viscous.yaml", mu=5.0, n0=0.5, method="adams")
     assert float(found.margin_more) == pytest.approx(0.5, rel=0.01)
-    assert bool(found.decided)
+    assert bool(found.certain)
 
 
 @pytest.mark.campaign
@@ -81,7 +81,7 @@ def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
 def test_shipped_configurations_end_decided(name: str) -> None:
     """Of the others, three are of nearly round bodies too, two go to a published time, and two reverse for ever."""
     found = sweep.run(ROOT / "configs" / f"{name}.yaml")
-    assert float(found.decided.mean()) >= 0.98
+    assert float(found.certain.mean()) >= 0.98
 
 
 @pytest.mark.campaign
@@ -96,8 +96,8 @@ def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
 def test_no_decided_count_contradicts_the_spin(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", measure=["reversals", "margin"])
     odd = np.sign(found.n0) * np.sign(found.spin_final) != (-1.0) ** found.reversals
-    assert not (odd & (found.decided == 1)).any()
-    assert (found.decided == 1).sum() > 20
+    assert not (odd & (found.certain == 1)).any()
+    assert (found.certain == 1).sum() > 20
 
 
 def test_settled_trajectories_stay_where_they_are_said_to() -> None:
@@ -121,16 +121,16 @@ def test_what_is_left_of_a_rattle_may_turn_a_spin_that_a_couple_slows() -> None:
     body = {"a": 2.34302, "b": 1.04662, "delta": -0.01263}
     scene = {"body": body, "friction": {"mu": 750.3, "sigma": 0.01134}, "start": {"x0": 0.02637, "y0": 0.01432}}
     swept, whole = (sweep.run(scene, n0=-0.06944, t_end=3000.0, stop_early=ends) for ends in (True, False))
-    assert (int(swept.reversals), int(whole.reversals), int(swept.decided)) == (1, 1, 0)
+    assert (int(swept.reversals), int(whole.reversals), int(swept.certain)) == (1, 1, 0)
     weak = sweep.run({"friction": {"mu": 60, "sigma": 1e-4}, "start": {"n0": 0.02}})
-    assert (int(weak.status), int(weak.decided)) == (SETTLED, 1)
+    assert (int(weak.status), int(weak.certain)) == (SETTLED, 1)
 
 
 def test_the_end_of_a_rattle_that_outlasts_the_spin_is_foreseen() -> None:
     """The couple takes the spin within a hundred units of time, and the rattle decays in thousands."""
     scene = {"friction": {"mu": 120, "sigma": 0.1}, "body": {"b": [2.0, 3.0, 5.0, 8.0]}, "start": {"n0": 0.05}}
     found, later = sweep.run(scene), sweep.run(scene, stop_early=False, t_end=1e5)
-    assert (found.decided == 1).all()
+    assert (found.certain == 1).all()
     np.testing.assert_array_equal(found.reversals, later.reversals)
     assert (abs(found.spin_final) < 1e-3 * 0.05).all()
 
@@ -152,9 +152,9 @@ def test_no_count_of_a_body_that_a_couple_slows_is_decided_too_early() -> None:
     }  # fmt: skip
     scene = {"cases": {name: values.tolist() for name, values in cells.items()}}
     swept, whole = sweep.run(scene, t_end=10_000.0), sweep.run(scene, stop_early=False, t_end=40_000.0)
-    decided = swept.decided == 1
-    assert int(decided.sum()) > 80
-    assert (swept.reversals == whole.reversals).values[decided].all()
+    certain = swept.certain == 1
+    assert int(certain.sum()) > 80
+    assert (swept.reversals == whole.reversals).values[certain].all()
 
 
 NEARLY_ROUND = {
@@ -178,7 +178,7 @@ def test_the_spin_of_a_nearly_round_body_reverses_once() -> None:
     found = sweep.run(NEARLY_ROUND, b=NEARLY_ROUND["body"]["b"][:4])
     assert found.reversals.values.tolist() == [1, 1, 1, 1]
     assert (found.spin_final < 0).all()
-    assert (found.decided == 1).all()
+    assert (found.certain == 1).all()
 
 
 QUICK = [
@@ -218,7 +218,7 @@ def test_a_count_of_the_wrong_parity_is_not_decided(monkeypatch: pytest.MonkeyPa
     start = Reversals.start
     monkeypatch.setattr(Reversals, "start", lambda *args: {**start(*args), "first_spin": 0.0})
     found = sweep.run(NEARLY_ROUND, b=1.00001)
-    assert (found.reversals.item(), found.spin_final.item() < 0, found.decided.item()) == (0, True, 0)
+    assert (found.reversals.item(), found.spin_final.item() < 0, found.certain.item()) == (0, True, 0)
 
 
 @pytest.mark.campaign

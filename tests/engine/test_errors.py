@@ -17,7 +17,7 @@ from sweep.engine.life import begin, live
 from sweep.engine.plan import first_tolerance, kernel_of, plan, steps_of
 from sweep.kernels.method import FIXED, MISSED, REPEAT
 from sweep.kernels.methods import PLAIN
-from sweep.kernels.status import SETTLED, TIME_LIMIT
+from sweep.kernels.status import SETTLED, TIME_LIMIT, Doubt
 from sweep.results.dataset import measured
 from sweep.results.summary import describe
 
@@ -109,7 +109,7 @@ def test_no_error_is_claimed_for_a_spin_that_round_off_decides(tolerance: float)
     """Run and companion agree because both have the same floor."""
     found = cells([IN_NOISE], method="adams", tolerance=tolerance, t_end=1827.0)
     assert abs(float(found.spin_final[0]) - 0.0386) > 0.01
-    assert int(found.noise_limited[0]) == 1
+    assert found.doubts[0].item() & Doubt.ROUND_OFF
     assert np.isnan(found.spin_error[0])
     assert int(found.step_rule[0]) != MISSED
     assert "round-off decides" in describe(found).splitlines()[-1]
@@ -138,7 +138,8 @@ def test_a_certain_count_does_not_depend_on_the_tolerance(tolerance: float, body
 def test_what_nobody_asked_for_is_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(errors, "companions", None)
     found = cells([BODY], method="adams", estimate_errors=False)
-    assert not {"spin_error", "sensitive"} & set(found)
+    assert not {"spin_error", "certain"} & set(found)
+    assert not found.doubts.values[0] & (Doubt.STEP | Doubt.MARGIN | Doubt.TOLERANCE)
     assert int(found.status[0]) == TIME_LIMIT
 
 
@@ -147,7 +148,7 @@ def test_a_chaotic_cell_says_so() -> None:
     found = cells([CHAOTIC, BODY], t_end=10_000)
     assert found.step_rule.values[0] == MISSED
     assert found.spin_error.values[0] > 1e-5
-    assert found.sensitive.values.tolist() == [1, 0]
+    assert (found.doubts.values & (Doubt.STEP | Doubt.TOLERANCE)).tolist() == [Doubt.STEP | Doubt.TOLERANCE, 0]
 
 
 @pytest.mark.campaign

@@ -9,7 +9,7 @@ from support import Write
 import sweep
 from sweep.explorer.setup import Setup
 from sweep.explorer.slices import Source, open_source
-from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
+from sweep.kernels.status import LIFT_OFF, TIME_LIMIT, Doubt
 
 TEXT = """\
 name: tiny
@@ -33,8 +33,8 @@ def tiny(kept: Write) -> Path:
     status = dataset["status"].values
     status[:3, 0, 1] = LIFT_OFF, 1, TIME_LIMIT
     status[3, 0, 1] = 1
-    dataset["noise_limited"].values[:] = 0
-    dataset["noise_limited"].values[3, 0, 1] = 1
+    dataset["doubts"].values[:] = 0
+    dataset["doubts"].values[3, 0, 1] = Doubt.ROUND_OFF
     path = config.with_suffix(".nc")
     dataset.to_netcdf(path)
     return path

@@ -59,10 +59,10 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     measure = ("reversals", "resting_spin")
     build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
     assert started == [
-        ("kernel", "adams", "slip", "reversals", "noise_limited", "decay"),
+        ("kernel", "adams", "slip", "reversals", "round_off", "decay"),
         ("images", "adams", "slip"),
         ("endings", "dopri5", "slip"),
-        ("kernel", "dopri5", "slip", "reversals", "noise_limited", "decay"),
+        ("kernel", "dopri5", "slip", "reversals", "round_off", "decay"),
     ]
 
 
@@ -70,7 +70,7 @@ def test_foreseen_counts_have_pieces_of_their_own(started: list[tuple[str, ...]]
     """What follows the slow equations is the same for all models; a prediction needs no kernel."""
     foreseen = [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
     build([kernel(measure=("reversals", "foreseen"))])
-    assert started[:3] == [*foreseen, ("kernel", "dopri5", "slip", "reversals", "noise_limited", "decay")]
+    assert started[:3] == [*foreseen, ("kernel", "dopri5", "slip", "reversals", "round_off", "decay")]
     started.clear()
     sweep.predict({"friction": {"mu": 60}}, measure=["foreseen"])
     assert started == foreseen

@@ -38,7 +38,7 @@ def test_margins_are_extremes_of_the_averaged_spin(mu: float, t_end: float) -> N
     arc = np.abs(spin[changes[-1] + 1 :])
     assert float(swept.margin_fewer) == pytest.approx(arc.max(), rel=1e-2)
     assert float(swept.margin_more) == pytest.approx(arc[arc.argmax() :].min(), rel=1e-2)
-    assert swept.decided == 1
+    assert swept.certain == 1
 
 
 def test_margins_on_both_sides_lie_on_one_line() -> None:
@@ -54,7 +54,7 @@ def test_margins_that_are_not_known_are_missing() -> None:
     assert found.status == TIME_LIMIT
     assert np.isnan(found.margin_more)
     assert found.margin_fewer > 0
-    assert found.decided == 0
+    assert found.certain == 0
     none = sweep.run(SCENE, n0=0.001)
     assert (int(none.reversals), bool(np.isnan(none.margin_fewer)), bool(none.margin_more > 0)) == (0, True, True)
 

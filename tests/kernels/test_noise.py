@@ -10,7 +10,7 @@ import sweep
 from sweep.kernels.adams import stretches
 from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
-from sweep.kernels.status import QUIET, RUNNING
+from sweep.kernels.status import QUIET, RUNNING, Doubt
 from sweep.models import MODELS
 from sweep.models.general import rigid_body
 from sweep.models.ladder import slip
@@ -31,7 +31,7 @@ def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
     assert [(n, pytest.approx(t, rel=1e-3)) for n, t in cases.values()] == list(
         zip(ADAMS.table(table)["reversals"], ADAMS.table(table)["last_reversal"], strict=True)
     )
-    assert not ADAMS.table(table)["noise_limited"].any()
+    assert not ADAMS.table(table)["round_off"].any()
 
 
 @pytest.mark.campaign
@@ -48,14 +48,14 @@ def test_so_they_do_for_a_real_body() -> None:
     )  # fmt: skip
     assert list(found.reversals) == [n for n, _ in (LAST | FIRM).values()]
     np.testing.assert_allclose(found.t_last_reversal / time, [t for _, t in (LAST | FIRM).values()], rtol=1e-3)
-    assert not found.noise_limited.any()
+    assert not (found.doubts & Doubt.ROUND_OFF).any()
 
 
 def test_dopri5_flags_reversals_that_round_off_moved() -> None:
     mu = [200.0, 188.0, 180.0, 176.0, 60.0, 130.0]
     step, _ = automatic_step("dopri5", MODELS["slip"], columns(mu=mu))
     table = run(DOPRI, step, 30_000.0, settle=True, mu=mu)
-    assert list(DOPRI.table(table)["noise_limited"]) == [1, 1, 1, 1, 0, 0]
+    assert list(DOPRI.table(table)["round_off"]) == [1, 1, 1, 1, 0, 0]
     assert list(DOPRI.table(table)["reversals"]) == [9, 9, 9, 9, 3, 6]
     last, true = DOPRI.table(table)["last_reversal"], np.array([(LAST | FIRM)[m][1] for m in mu])
     np.testing.assert_allclose(last[4:], true[4:], rtol=1e-3)
@@ -70,7 +70,7 @@ def test_a_mode_that_sank_is_flagged_only_once_it_has_grown_back() -> None:
         table = run(DOPRI, step, t_end, settle=True, mu=200.0)
         assert DOPRI.table(table)["reversals"][0] == 8
         assert table[0, [DOPRI.layout.index("depth0"), DOPRI.layout.index("depth1")]].min() < np.log(noise.DEPTH)
-        assert DOPRI.table(table)["noise_limited"][0] == flag
+        assert DOPRI.table(table)["round_off"][0] == flag
 
 
 def test_a_mode_let_down_too_late_is_flagged() -> None:
@@ -79,7 +79,7 @@ def test_a_mode_let_down_too_late_is_flagged() -> None:
     ADAMS.table(table)["status"] = QUIET
     ADAMS.carry(table)
     assert (ADAMS.table(table)["status"] == RUNNING).all()
-    assert list(ADAMS.table(table)["noise_limited"]) == [0, 1]
+    assert list(ADAMS.table(table)["round_off"]) == [0, 1]
     assert list(ADAMS.table(table)["lift0"]) == [12, 0]
 
 

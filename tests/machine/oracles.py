@@ -60,12 +60,12 @@ def sound(config: Config, dataset: xr.Dataset) -> None:
         assert (found["t_stop"][ran] <= config.integrator.t_end + found["step"][ran]).all(), "a run ends after t_end"
         assert np.isfinite(found["spin_final"][ran]).all()
         assert not (found["spin_error"][ran] < 0).any() if "spin_error" in found else True
-    if "decided" in found and config.of_rattlebacks:
+    if "certain" in found and config.of_rattlebacks:
         model = config.equations
         of_ran = {name: columns[name][ran] for name in model.parameters}  # impossible bodies have no constants
         start = np.zeros(len(status))
         start[ran], *_ = model.energy(model.start(of_ran), model.constants.of(of_ran))
-        known = (found["decided"] == 1) & (start != 0)
+        known = (found["certain"] == 1) & (start != 0)
         odd = np.sign(start) * np.sign(found["spin_final"]) != (-1.0) ** found["reversals"]
         assert not (odd & known).any(), f"parity of {_first(found, odd & known)}"
     if "reversals" in found:
@@ -90,8 +90,8 @@ def alike(one: Rows, other: Rows, spin: float = 1.0) -> None:
     """The same ends, counts and spins times `spin`, where both are certain: their numbers differ by rounding."""
     certain = np.ones(len(one["status"]), bool)
     for found in (one, other):
-        if "decided" in found:
-            certain &= (found["decided"] == 1) & (found.get("sensitive", 0 * found["status"]) == 0)
+        if "certain" in found:
+            certain &= found["certain"] == 1
         else:
             certain &= np.isin(found["status"], (*FAILURES, IMPOSSIBLE))
     for name in ("status", "reversals"):

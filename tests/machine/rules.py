@@ -389,7 +389,7 @@ class Machine(RuleBasedStateMachine):
             again = oracles.rows(self._run(self.scene.with_({"cases": cases}, *keys, "picture")))
             if "reversals" not in again:  # the search alone counts
                 return
-            known = again["decided"] == 1 if "decided" in again else np.zeros(len(again["status"]), bool)
+            known = again["certain"] == 1 if "certain" in again else np.zeros(len(again["status"]), bool)
             np.testing.assert_array_equal(again["reversals"][known], points[f"reversals_{end}"].values[known])
 
     @precondition(lambda self: self.far)

@@ -80,9 +80,9 @@ def test_counts_of_a_body_that_a_couple_slows(sigma: float) -> None:
     """It reverses less often the stronger the couple is."""
     friction = {"mu": [30, 80, 150], "sigma": sigma}
     found = sweep.run(LINE | {"friction": friction, "start": {"n0": 0.05}, "measure": MEASURE})
-    decided, right = found.decided == 1, found.reversals == found.reversals_foreseen
-    assert float(right.where(decided).mean()) > 0.85
-    assert float(right.where(decided & (found.foreseen_sure == 1)).mean()) == 1
+    certain, right = found.certain == 1, found.reversals == found.reversals_foreseen
+    assert float(right.where(certain).mean()) > 0.85
+    assert float(right.where(certain & (found.foreseen_sure == 1)).mean()) == 1
     assert float(found.foreseen_sure.mean()) > 0.3
 
 
@@ -176,10 +176,10 @@ def test_a_start_by_angles_and_rates_is_foreseen() -> None:
     """The same motion as by n0, x0 and y0 where the body spins about the vertical; and another one that is pushed."""
     start = {"roll": 0.01, "pitch": 0.002, "omega3": [-0.05, 0.05], "omega1": [0.0, 0.01]}
     found = sweep.run(LINE | {"start": start, "measure": ["reversals", "margin", "foreseen"]})
-    right, decided = (found.reversals == found.reversals_foreseen).values, found.decided.values == 1
-    assert right[decided].mean() > 0.8
+    right, certain = (found.reversals == found.reversals_foreseen).values, found.certain.values == 1
+    assert right[certain].mean() > 0.8
     assert found.foreseen_sure.values.any()
-    assert right[decided & (found.foreseen_sure.values == 1)].all()
+    assert right[certain & (found.foreseen_sure.values == 1)].all()
 
 
 def test_a_body_in_si_has_the_same_counts() -> None:

@@ -1,15 +1,18 @@
 """Which kind each cell of a dataset is of, and the words for it."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
 
-from sweep.kernels.status import DIVERGED, LIFT_OFF, SETTLED, TIME_LIMIT
+from sweep.kernels.status import DIVERGED, LIFT_OFF, SETTLED, TIME_LIMIT, Doubt
 from sweep.parameters import PARAMETERS
 from sweep.plots import labels
 from sweep.plots.marks import BLANK, WORDS, legend, marks
 from sweep.plots.quantities import field
 from sweep.results.dataset import VARIABLES, described
+from sweep.results.summary import describe
 from sweep.units import PAPER_UNITS
 from sweep.variables import attributes
 
@@ -25,9 +28,7 @@ def cells() -> xr.Dataset:
         "reversals_predicted": [3, 6, 5, 5, 5, 1],
         "t_last_reversal": [10, 20, np.nan, np.nan, np.nan, np.nan],
         "spin_final": [0.1, 0.2, np.nan, np.nan, np.nan, 0.1],
-        "noise_limited": [1, 0, 1, 0, 0, 0],
-        "window_dependent": [0, 1, 1, 0, 0, 0],
-        "sensitive": [1, 0, 0, 0, 0, 0],
+        "doubts": [Doubt.STEP | Doubt.ROUND_OFF, Doubt.WINDOWS, Doubt.WINDOWS | Doubt.ROUND_OFF, 0, 0, 0],
     }
     specs = {name: VARIABLES[name] for name in values}
     variables = {name: ("mu", np.array(values[name], s.dtype), described(s)) for name, s in specs.items()}
@@ -37,7 +38,7 @@ def cells() -> xr.Dataset:
 
 def test_the_kinds_of_a_count(cells: xr.Dataset) -> None:
     kinds = {kind: where.values.nonzero()[0].tolist() for kind, where in marks(cells, "reversals").items()}
-    some = {"not_run": [4], "failed": [2, 3], "time_limit": [1], "noise_limited": [0], "uncertain": [0, 1]}
+    some = {"not_run": [4], "failed": [2, 3], "time_limit": [1], "round_off": [0], "uncertain": [0, 1]}
     assert kinds == {kind: [] for kind in WORDS} | some
     assert list(kinds) == list(WORDS)
 
@@ -99,3 +100,12 @@ def test_constants_stand_in_the_order_of_the_reference() -> None:
     # Zero is nothing special in a user's model, whose parameters may have any names.
     own = dataset.assign_attrs(model_brings="a model", model_parameters="mass Ixz")
     assert labels.constants(own).startswith("mass = 1 kg, Ixz = 0, omega3".replace("omega3", "ω₃"))
+
+
+def test_a_map_and_the_last_lines_of_a_run_agree_on_the_number_of_uncertain_counts(small: xr.Dataset) -> None:
+    number, size = int((small["certain"] == 0).sum()), small["certain"].size
+    assert 0 < number < size
+    assert legend(small, "reversals")["uncertain"] == f"uncertain count ({number})"
+    said = describe(small)
+    assert f"\n{size - number} of {size} counts are certain; the others:\n" in said
+    assert sum(map(int, re.findall(r"^  (\d+) ", said, re.MULTILINE))) == number

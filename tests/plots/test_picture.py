@@ -15,7 +15,7 @@ from support.cli import invoke, refused
 from support.figures import constants, entries, made, maps
 
 from sweep.config import InputError
-from sweep.kernels.status import DIVERGED, TIME_LIMIT
+from sweep.kernels.status import DIVERGED, TIME_LIMIT, Doubt
 from sweep.plots import panels, picture, scales
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
@@ -68,7 +68,7 @@ def test_a_boundary_is_drawn_with_its_number_or_not_at_all(width: str | None) ->
 
 def test_dots_at_uncertain_cells_can_be_seen_on_a_large_map() -> None:
     dataset = made(mu=np.linspace(20, 200, 60), b=np.linspace(2, 9, 60))
-    dataset["sensitive"] = dataset["noise_limited"] + 1
+    dataset["doubts"][:] = Doubt.STEP
     (dots,) = [line for line in maps(picture.plot(dataset, "reversals"))[0].lines if line.get_gid() == "uncertain"]
     assert dots.get_markersize() >= 2
 
@@ -163,13 +163,13 @@ def test_hatches_stand_out_from_dark_and_light_cells() -> None:
     assert white.get_path().vertices[:, 1].max() <= black.get_path().vertices[:, 1].min()  # low counts are dark
 
 
-def test_failed_and_noise_limited_cells_look_different() -> None:
+def test_failed_cells_and_those_limited_by_round_off_look_different() -> None:
     dataset = made()
     dataset["status"][0] = DIVERGED
-    dataset["noise_limited"][3] = 1
+    dataset["doubts"][3] = Doubt.ROUND_OFF
     figure = picture.plot(dataset)
     axes = maps(figure)[0]
-    hatches = {marked(axes, kind)[0].get_hatch() for kind in ("failed", "noise_limited", "time_limit")}
+    hatches = {marked(axes, kind)[0].get_hatch() for kind in ("failed", "round_off", "time_limit")}
     assert len(hatches) == 3
     assert mesh(axes).get_array().mask[0].all()
     assert not mesh(maps(figure)[1]).get_array().mask.any()  # a prediction cannot fail

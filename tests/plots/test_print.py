@@ -14,7 +14,7 @@ from support.cli import invoke, refused
 from support.figures import entries, made
 
 from sweep.faults import InputError
-from sweep.kernels.status import DIVERGED, IMPOSSIBLE, LIFT_OFF, TIME_LIMIT
+from sweep.kernels.status import DIVERGED, IMPOSSIBLE, LIFT_OFF, TIME_LIMIT, Doubt
 from sweep.plots import picture
 from sweep.results.netcdf import open_dataset, write
 
@@ -69,8 +69,7 @@ def test_a_legend_has_few_rows(marked: int) -> None:
     """With all four lines, and with some or nearly all kinds of cell at once."""
     one = made()
     one["margin_more"], one["margin_fewer"] = 0 * one["spin_final"] + 0.5, 0 * one["spin_final"] + 0.5
-    one["noise_limited"].values[6, 0, 0] = 1
-    one["sensitive"] = one["noise_limited"].roll(b=1)
+    one["doubts"].values[6, :2, 0] = Doubt.ROUND_OFF, Doubt.STEP
     if marked > 3:
         one["status"].values[:5, 0, 0] = [0, LIFT_OFF, DIVERGED, IMPOSSIBLE, TIME_LIMIT]
     figure = picture.plot(one, "reversals", width="180mm")

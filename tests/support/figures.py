@@ -41,7 +41,7 @@ def made(**axes: Any) -> xr.Dataset:
         "reversals_predicted": count + 2,
         "status": status,
         "spin_final": np.broadcast_to(np.linspace(-0.1, 0.02, len(mu))[:, None, None], shape),
-        "noise_limited": np.zeros(shape),
+        "doubts": np.zeros(shape),
         "n_c1_linear": n_c1,
         "n_c1": 3 * n_c1,
         "n_c2": 2 * n_c1,

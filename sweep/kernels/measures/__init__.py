@@ -9,7 +9,7 @@ from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.foreseen import Foreseen
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
-from sweep.kernels.measures.noise import NoiseLimited
+from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import RestingSpin
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
@@ -22,7 +22,7 @@ _KINDS: tuple[type[Measurement], ...] = (
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
 """The measurements that a configuration can ask for."""
 
-OF_COUNTS: tuple[type[Measurement], ...] = (NoiseLimited, Decay)
+OF_COUNTS: tuple[type[Measurement], ...] = (RoundOff, Decay)
 """The measurements without which a count and its error cannot be judged."""
 
 

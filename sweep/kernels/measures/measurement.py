@@ -15,14 +15,14 @@ them in hooks, all of which are optional:
     make_look          for one lane at every look, after that decision
     skip               for many images, when they have covered a stretch without steps
     mode_lost          for many images, when the lift of a mode has failed
-    read               once, when the trajectories have ended
+    read, doubts       once, when the trajectories have ended
 
 A hook `make_…` is itself called once, when the kernel is made.  It returns None, or a function marked
 `sweep.jit.inline`, which becomes part of the compiled loop and is called as listed.  That happens for every lane, even
 one that is idle or has ended, so the function must not change the quantities where its arguments say that the step
 does not count.  After a step it has to do so by conditional expressions rather than branches, so that the loop over
-lanes stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost` and `read`
-a quantity is `table["name"]`, of shape (images,).
+lanes stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost`, `read`
+and `doubts` a quantity is `table["name"]`, of shape (images,).
 
 Whatever a run does not measure takes no space in its images and adds no instruction to its kernel.
 
@@ -42,14 +42,10 @@ from sweep.variables import Variable
 
 
 def measured(
-    dtype: str, units: Unit, long_name: str, description: str = "", *, flag: str = "", along: tuple[str, ...] = ()
+    dtype: str, units: Unit, long_name: str, description: str = "", *, along: tuple[str, ...] = ()
 ) -> Variable:
-    """Describe a variable that a measurement adds to the dataset; it is undefined for a trajectory that failed.
-
-    `flag` is the name of the value 1 of a variable that marks some cells; the value 0 is called "firm".
-    """
-    flags = {0: "firm", 1: flag} if flag else None
-    return Variable(dtype, units, long_name, description, flags, along=along, of_sound_runs=True)
+    """Describe a variable that a measurement adds to the dataset; it is undefined for a trajectory that failed."""
+    return Variable(dtype, units, long_name, description, along=along, of_sound_runs=True)
 
 
 WORK, RIPPLE = "work", "ripple"
@@ -212,3 +208,7 @@ class Measurement:
         the quantities of the same names.
         """
         return {name: table[name] for name in self.variables if name in self.quantities}
+
+    def doubts(self, table: Table) -> Array | int:
+        """Bits of `sweep.kernels.status.Doubt`: what it has against the results of these images, shape (cells,)."""
+        return 0

@@ -21,13 +21,13 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch, measured
+from sweep.kernels.measures.measurement import Measurement, Stretch
+from sweep.kernels.status import Doubt
 from sweep.models.general import starts
 from sweep.models.general.reversal_time import energies
 from sweep.models.model import MODES, Array, Columns, Model, stack
 from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear
-from sweep.units import NUMBER
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.
 DEPTH = 1e-14
@@ -44,23 +44,14 @@ _ZERO = 1e-300
 _STARTS = (*starts.POINT, *starts.ANGLES, *starts.SLIP)
 
 
-class NoiseLimited(Measurement):
-    name = "noise_limited"
+class RoundOff(Measurement):
+    name = "round_off"
     summary = "whether round-off decides the times of late reversals"
     asks = MODES
     needs = ("reversals",)
     quantities = (
-        *_LOGS, *_DEPTHS, *_RATES, "tracked", "tracked_spin", "tracked_reversals", "noise_limited",
+        *_LOGS, *_DEPTHS, *_RATES, "tracked", "tracked_spin", "tracked_reversals", "round_off",
     )  # fmt: skip
-
-    variables = {
-        "noise_limited": measured(
-            "int8", NUMBER, "are late times limited by round-off?",
-            "Whether a mode of the rattle fell under the round-off of the other before it grew: the reversal that it "
-            "causes comes too early, by an unknown time, and spin_final is not known either.",
-            flag="noise_limited",
-        )
-    }  # fmt: skip
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         shares = _shares(model, columns)
@@ -122,7 +113,10 @@ class NoiseLimited(Measurement):
         table["tracked_spin"] = stretch.spin
 
     def mode_lost(self, table: Table, images: Array) -> None:
-        table["noise_limited"] = np.where(images, 1.0, table["noise_limited"])
+        table["round_off"] = np.where(images, 1.0, table["round_off"])
+
+    def doubts(self, table: Table) -> Array:
+        return np.where(table["round_off"] > 0, Doubt.ROUND_OFF, 0)
 
 
 def growth_coefficients(model: Model, columns: Columns) -> Array:

@@ -21,6 +21,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import RIPPLE, Measurement, Stretch, measured
+from sweep.kernels.status import Doubt
 from sweep.models.model import COUNT, Array, Columns, Model
 from sweep.units import NUMBER, SPIN, TIME
 
@@ -42,10 +43,6 @@ class Reversals(Measurement):
         "spin_mean": measured(
             "float64", SPIN, "final spin n, without ripple",
             "Ripple-free spin averaged over the last full window before t_stop.",
-        ),
-        "window_dependent": measured(
-            "int8", NUMBER, "does the count depend on the windows?",
-            "Whether windows that begin half a period later give another number of reversals.", flag="window_dependent",
         ),
     }  # fmt: skip
 
@@ -130,5 +127,7 @@ class Reversals(Measurement):
             "reversals": table["reversals"],
             "t_last_reversal": table["last_reversal"],
             "spin_mean": np.where(closed, table["closed_window"] / table["period"], np.nan),
-            "window_dependent": table["reversals"] != table["reversals_shifted"],
         }
+
+    def doubts(self, table: Table) -> Array:
+        return np.where(table["reversals"] != table["reversals_shifted"], Doubt.WINDOWS, 0)
