@@ -473,8 +473,27 @@ def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Datas
     return opened(local_path(path, "path"), load=load)
 
 
+class _Ended:
+    """Property of `Accessor`: a mask of the cells whose status has its name."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, accessor: Accessor, owner: type) -> xr.DataArray:
+        from sweep.results.dataset import STATUSES
+
+        codes = {name: code for code, name in STATUSES.items()}
+        return accessor._dataset["status"] == codes[self._name]
+
+
 class Accessor:
-    """Adds methods of this package to xarray datasets: `dataset.sweep.plot()`, `dataset.sweep.trajectory()`."""
+    """Adds methods of this package to xarray datasets: `dataset.sweep.plot()`, `dataset.sweep.trajectory()`.
+
+    `dataset.sweep.settled` and the like are masks of the cells with each status.
+    """
+
+    not_run, settled, time_limit, impossible = _Ended(), _Ended(), _Ended(), _Ended()
+    lift_off, diverged, paradox, toppled = _Ended(), _Ended(), _Ended(), _Ended()
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset

@@ -88,7 +88,7 @@ def test_shipped_configurations_end_decided(name: str) -> None:
 @pytest.mark.parametrize("name", ["b", "quick"])
 def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", estimate_errors=False)
-    assert (found.status == SETTLED).all()
+    assert found.sweep.settled.all()
 
 
 @pytest.mark.campaign
@@ -105,7 +105,7 @@ def test_settled_trajectories_stay_where_they_are_said_to() -> None:
     settings |= {"t_end": 30_000, "method": "adams", "measure": list(default_measures("slip"))}
     quick = ROOT / "configs" / "quick.yaml"
     left, later = (sweep.run(quick, **settings, stop_early=stops) for stops in (True, False))
-    settled = (left.status == SETTLED).values
+    settled = left.sweep.settled.values
     rest, end = left.spin_rest.values, later.spin_final.values
     # Beyond n_c1 a rattle grows, and turns the spin back, before it decays.
     n_c1 = left.n_c1_linear.sel(sign=np.sign(left.spin_final).astype(int))

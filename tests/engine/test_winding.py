@@ -10,7 +10,7 @@ from sweep.config import load_config
 from sweep.engine import executor
 from sweep.engine.ending import whole_blocks
 from sweep.engine.plan import plan
-from sweep.kernels.status import RUNNING, SETTLED
+from sweep.kernels.status import RUNNING
 from sweep.models.ladder import slip
 from sweep.models.stiff.precession import vertical_spin
 from sweep.models.stiff.slip import form_of
@@ -74,7 +74,7 @@ def test_what_has_wound_down_reverses_no_more() -> None:
     scene = {"name": "fresh", "cases": cells, "start": {"x0": 0.01, "y0": 0.01}, "integrator": {"method": "adams"}}
     found = sweep.run(scene, estimate_errors=False)
     far = sweep.run(scene, estimate_errors=False, stop_early=False, t_end=1e6)
-    settled = (found.status == SETTLED).values
+    settled = found.sweep.settled.values
     assert settled.mean() > 0.9
     assert (found.t_stop.values[settled] < 20_000).sum() > 3
     np.testing.assert_array_equal(found.reversals[settled], far.reversals[settled])

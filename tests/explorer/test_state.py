@@ -13,7 +13,7 @@ HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",
     "show=<script>alert(1)</script>": "show=<script>alert(1)</script> is not there; choose ",
     "x=delta": "x=delta is not there; choose mu, b, n0",
-    "file=/etc/passwd": "unknown URL parameter 'file'; expected one of show, x, y, mu, b, n0, palette, low,",
+    "file=/etc/passwd": "unknown URL parameter 'file'; expected one of show, x, y, mu, b, n0, sign, palette, low,",
     "n0=nan": "n0=nan is not there; choose from 0.02 to 0.05",
     "n0=" + "1" * 5000: "n0=1111",
     "palette=jet": "palette=jet is not there; choose , viridis",
@@ -44,14 +44,14 @@ def test_the_longest_axes_are_shown_first(source: Source) -> None:
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
     cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
-    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0}, cells, "gray", limits={"high": 4.5})
+    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0, "sign": 1}, cells, "gray", limits={"high": 4.5})
     again, faults = read(state.write(shown, source, base), source, base)
     assert not faults
     assert again == shown
 
 
 def test_a_cell_in_the_address_names_no_more_than_it_has_to(source: Source, base: state.Cell) -> None:
-    shown = State("mu", "b", "reversals", {"n0": 1}, ({**base, "mu": 47.0},))
+    shown = State("mu", "b", "reversals", {"n0": 1, "sign": 0}, ({**base, "mu": 47.0},))
     assert state.write(shown, source, base).endswith("cell=b:2,mu:47,n0:0.02")
 
 

@@ -7,7 +7,6 @@ from support import ROOT, wide_bodies
 from support.runs import settled
 
 import sweep
-from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models import MODELS
 from sweep.models.theory import stability
 
@@ -51,7 +50,7 @@ def test_margins_on_both_sides_lie_on_one_line() -> None:
 
 def test_margins_that_are_not_known_are_missing() -> None:
     found = sweep.run(SCENE, t_end=3000.0)
-    assert found.status == TIME_LIMIT
+    assert found.sweep.time_limit
     assert np.isnan(found.margin_more)
     assert found.margin_fewer > 0
     assert found.certain == 0
@@ -63,9 +62,9 @@ def test_what_the_slow_equations_settle_stays_as_it_is() -> None:
     """Cells that have come to the time limit: most are final already, and what is called so is."""
     axes = {"mu": np.linspace(60, 200, 8), "b": np.linspace(1.6, 8.0, 8)}
     ended, later = (sweep.run(SCENE, **axes, t_end=t_end, estimate_errors=False) for t_end in (5000.0, 1e5))
-    shown = ((ended.status == SETTLED) & (ended.t_stop == 5000)).values
+    shown = (ended.sweep.settled & (ended.t_stop == 5000)).values
     assert shown.sum() >= 5
-    assert ((later.status == SETTLED).values[shown]).all()
+    assert (later.sweep.settled.values[shown]).all()
     np.testing.assert_array_equal(ended.reversals.values[shown], later.reversals.values[shown])
     np.testing.assert_allclose(ended.margin_more.values[shown], later.margin_more.values[shown], rtol=0.05)
     assert (later.reversals > ended.reversals).values[~shown].any()

@@ -166,3 +166,9 @@ def test_an_edit_changes_the_hash_where_it_can_change_numbers(tmp_path: Path, mo
 
     assert not any(map(changed, ("explorer/page.py", "plots/picture.py", "cli/runs.py", "bench/new.py")))
     assert all(map(changed, ("config/schema.py", "engine/local.py", "kernels/adams/new.py", "models/user/loading.py")))
+
+
+def test_each_status_has_a_mask(small: xr.Dataset) -> None:
+    one = small.isel(mu=0, b=0, n0=0).expand_dims(cell=len(STATUSES)).assign(status=("cell", [*STATUSES]))
+    for k, name in enumerate(STATUSES.values()):
+        assert getattr(one.sweep, name).values.nonzero()[0].tolist() == [k]

@@ -12,7 +12,6 @@ from support.runs import Heard
 
 import sweep
 from sweep.config import load_config
-from sweep.kernels.status import DIVERGED
 from sweep.models.model import stack
 from sweep.plots.trajectories import reversal_times
 
@@ -130,7 +129,7 @@ def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
     """Its step is beyond the stability limit, about 2.8 over the fastest rate of friction, so that no step is whole."""
     one = sweep.trajectory(write(STANDARD), mu=100, method="dopri5", step=0.15)
     assert (one.sizes["time"], float(one.time[0]), float(one.t_stop)) == (1, 0, 0)
-    assert one.status == DIVERGED
+    assert one.sweep.diverged
     assert float(one.spin[0]) == pytest.approx(0.05)
     assert float(one.table_x[0]) == float(one.heading[0]) == 0
 
