@@ -66,7 +66,7 @@ class Source:
             raise FileError(f"{name}: the axis {min(taken)} has the name of a key of the explorer's address")
         self.name = name
         self.dims = dims
-        ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in dims if d in dataset.coords}
+        ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in (*dims, "sign") if d in dataset.indexes}
         self.dataset = dataset.isel({d: o for d, o in ascending.items() if (np.diff(o) < 0).any()})
         # Those of the cells, followed by those along which a variable has several values per cell.
         of_cells = [v.dims for v in self.dataset.data_vars.values() if set(dims) & set(v.dims) and "end" not in v.dims]
