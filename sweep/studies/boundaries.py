@@ -263,7 +263,7 @@ class Along(Boundaries):
             yield from iter(self._wanted, [])
 
     def _counts(self, found: Mapping[str, Array]) -> Counts:
-        certain = found["decided"] == 1 if "decided" in found else found["status"] == SETTLED
+        certain = found["certain"] == 1 if "certain" in found else found["status"] == SETTLED
         return replace(Counts.of(found), known=certain)
 
     def _curves(self, found: Counts) -> Iterator[Curve]:

@@ -74,7 +74,7 @@ def along(known: Any, **axis: list[float]) -> Along:
             mu = search.rounds[tile]["mu"]
             distance, certain = known(mu)
             more, fewer = np.where(distance > 0, 9.0, -distance), np.where(distance > 0, distance, np.nan)
-            cells = {"status": np.full(len(mu), SETTLED), "reversals": (distance > 0) * 1.0, "decided": certain * 1}
+            cells = {"status": np.full(len(mu), SETTLED), "reversals": (distance > 0) * 1.0, "certain": certain * 1}
             return cells | {"margin_more": more, "margin_fewer": fewer, "seconds": np.array(0.0), "cpu": np.array("x")}
 
     search = Along(measuring(sweep.load_config(BODY, axis)), Formula(), ("mu",), 1e-6, 0.01)
