@@ -59,7 +59,7 @@ DOUBTS = {
     Doubt.MARGIN: ("close_to_another", "a margin is smaller than ten times its error, so another count is possible."),
     Doubt.ROUND_OFF: (
         "round_off",
-        "round-off decides the times of late reversals, so these and the final spin are unknown.",
+        "round-off decides when late reversals come; their times and the final spin are unknown.",
     ),
     Doubt.TOLERANCE: ("misses_tolerance", "the estimated error of the final spin exceeds the tolerance."),
 }
