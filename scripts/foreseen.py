@@ -4,7 +4,7 @@
     python scripts/foreseen.py wide CELLS SEED    random cells: a/c 1.5 to 50, μ 0.1 to 5000, n0 0.005 to 0.2
     python scripts/foreseen.py slowed CELLS SEED  the same with σ from 1e-5 to 0.3
 
-Shares of decided counts that are foreseen rightly and within one, by the start spin; of those called sure; and the same
+Shares of certain counts that are foreseen rightly and within one, by the start spin; of those called sure; and the same
 for the formula of Takano (2011), which has no σ.
 """
 
@@ -53,7 +53,7 @@ def wide(cells: int, seed: int, slowed: bool) -> dict[str, Any]:
 
 def say(words: str, found: xr.Dataset, where: Any) -> None:
     """Print the shares over the cells `where`."""
-    where &= found["decided"].values == 1
+    where &= found["certain"].values == 1
     counts, sure = found["reversals"].values.astype(int)[where], found["foreseen_sure"].values[where] == 1
     shares = {}
     for name in {"reversals_foreseen", "reversals_predicted"} & set(found):

@@ -217,7 +217,7 @@ class CriticalSpins(Search):
         size = np.exp([place for _, places in self._asked for place in places])
         distance = np.where(reversed_ & ~(distance > 0), size, distance)
         failed = ~counts.known & ~reversed_
-        certain = (found["status"] != SETTLED) | (found.get("decided", counts.known) == 1)
+        certain = (found["status"] != SETTLED) | (found.get("certain", counts.known) == 1)
         answers = zip(distance.tolist(), measured.tolist(), failed.tolist(), certain.tolist(), strict=True)
         for spin, places in self._asked:
             spin.learn([Answer(place, *next(answers)) for place in places])
