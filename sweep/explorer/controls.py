@@ -59,7 +59,10 @@ class MapControls:
         common: dict[str, Any] = {"title": choice.title, "name": choice.name, "stylesheets": [BARE]}
         if choice.axis:
             value = CustomJSTickFormatter(args={"words": list(choice.words)}, code="return words[tick]")
-            slider = Slider(start=0, end=len(choice.words) - 1, step=1, value=0, width=190, format=value, **common)
+            # Tooltips would read the words as HTML.
+            slider = Slider(
+                start=0, end=len(choice.words) - 1, step=1, value=0, width=190, format=value, tooltips=False, **common
+            )
             on(slider, "value_throttled", partial(self._pick, choice))
             return slider
         named = list(zip(choice.options, choice.words, strict=True))
@@ -149,7 +152,7 @@ class CellControls:
         self._edit = edit
         self._quiet = False
         self._rows = [self._row(k, activate, remove) for k in range(MAX_CELLS)]
-        self._end = Div(text="", margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
+        self._end = Div(text="", disable_math=True, margin=(0, 0, 4, 0), sizing_mode="stretch_width", name="ends")
         ordered = [*(n for n in source.dims if n in base), *(n for n in base if n not in source.dims)]
         self._inputs = {name: _Input(source, known[name], partial(self._edited, name)) for name in ordered}
         wrap = {"gap": "4px 10px", "flex-wrap": "wrap", "align-items": "flex-end"}

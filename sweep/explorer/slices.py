@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import chain
@@ -56,6 +57,7 @@ class Source:
     """
 
     def __init__(self, dataset: xr.Dataset, name: str = "dataset") -> None:
+        dataset = _plain_texts(dataset)
         cells = dataset["status"] if "status" in dataset else next(iter(dataset.data_vars.values()), None)
         dims = () if cells is None else tuple(str(d) for d in cells.dims if d not in FURTHER)
         of_kind = kind(dataset)
@@ -137,6 +139,19 @@ class Source:
             return ", ".join(labels.flags_set(cell[name])) or "none"
         finite = [labels.number(v) for v in values if np.isfinite(v)]
         return f"{', '.join(finite)} {labels.unit(cell, name)}".strip() if finite else "none"
+
+
+def _plain_texts(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose texts and names Bokeh shows as they are.
+
+    A joiner without width parts the signs in which Bokeh would recognise mathematics, which can hold links and HTML.
+    """
+
+    def plain(text: str) -> str:
+        return re.sub(r"[$\\]", "\\g<0>\N{WORD JOINER}", text)
+
+    names = {name: plain(str(name)) for name in {*dataset.variables, *dataset.dims}}
+    return labels.rewritten(dataset, plain).rename({name: new for name, new in names.items() if new != name})
 
 
 def open_source(path: Path) -> Source:

@@ -63,9 +63,10 @@ class View:
         self._address = ColumnDataSource({"query": []})
         self._address.js_on_change("data", CustomJS(code="sweep.address(cb_obj.data.query[0])"))
         self._map = Column(sizing_mode="stretch_width", name="map")
-        self._legend = Div(sizing_mode="stretch_width", name="legend")
-        self._cell = Div(sizing_mode="stretch_width", name="cell")
-        self._notice = Div(name="notice", styles=_NOTICE, sizing_mode="stretch_width", margin=0)
+        # Bokeh would read mathematics, with links and HTML, in texts of a dataset or of an address.
+        plain: dict[str, Any] = {"disable_math": True, "sizing_mode": "stretch_width"}
+        self._legend, self._cell = Div(name="legend", **plain), Div(name="cell", **plain)
+        self._notice = Div(name="notice", styles=_NOTICE, margin=0, **plain)
         self._figures = Curves(str(PARTS.empty()))
         self._controls = controls.MapControls(self._source, self._change)
         self._body = controls.BodyControls(self._source, self._constants, self._known, self._change)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -136,12 +136,17 @@ def constants(dataset: xr.Dataset) -> str:
 
 def escaped(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset in whose texts each dollar sign is escaped, because matplotlib reads mathematics between two."""
-    plain = dataset.copy()
-    holders: list[Any] = [plain, *plain.variables.values()]
+    return rewritten(dataset, lambda text: text.replace("$", r"\$"))
+
+
+def rewritten(dataset: xr.Dataset, change: Callable[[str], str]) -> xr.Dataset:
+    """Return a dataset in which `change` has been applied to all texts, except its configuration."""
+    changed = dataset.copy()
+    holders: list[Any] = [changed, *changed.variables.values()]
     for each in holders:
         texts = {key: text for key, text in each.attrs.items() if isinstance(text, str) and key != "config"}
-        each.attrs = {**each.attrs, **{key: text.replace("$", r"\$") for key, text in texts.items()}}
-    return plain
+        each.attrs = {**each.attrs, **{key: change(text) for key, text in texts.items()}}
+    return changed
 
 
 def in_maths(words: str) -> str:

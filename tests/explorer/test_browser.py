@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import numpy as np
 import pytest
@@ -666,7 +666,52 @@ def test_a_figure_is_saved_by_its_toolbar(clicked: Page, tmp_path: Path) -> None
     with clicked.expect_download() as download:
         clicked.locator("#map .bk-tool-icon-save").first.click()
     download.value.save_as(tmp_path / "map.png")
-    assert Image.open(tmp_path / "map.png").size[1] >= 480
+    with Image.open(tmp_path / "map.png") as saved:
+        assert saved.size[1] >= 480
+
+
+# ---- texts of a dataset
+
+HOSTILE = r'a $$\href{javascript:window.hacked=1}{b}$$ \[c\] \(d\) <img src=x onerror="window.hacked=1">'
+"""A text in which Bokeh would read mathematics, with a link, and HTML."""
+
+
+def test_texts_of_a_dataset_are_no_code(go: Open, tmp_path: Path) -> None:
+    dataset = sweep.predict({"friction": {"mu": [40, 60, 80]}, "body": {"b": [2, 3, 4]}, "start": {"n0": [0.02, 0.05]}})
+    flags = {"flag_values": np.int8([1, 2]), "flag_meanings": f"{HOSTILE.replace(' ', '_')} other"}
+    dataset["status"] = xr.ones_like(dataset["reversals_predicted"], "int8").assign_attrs(flags)
+    dataset = dataset.assign_attrs(title=HOSTILE)
+    for name, variable in dataset.variables.items():
+        variable.attrs.update(long_name=f"{name}: {HOSTILE}", description=HOSTILE, units=HOSTILE)
+    dataset.to_netcdf(tmp_path / "hostile.nc")
+    with explorer(tmp_path / "hostile.nc") as process:
+        place = address(process)
+        page = settle(go(f"{place}?x=mu&y=b&palette={quote(HOSTILE)}"))
+        asked = list[str]()
+        page.on("request", lambda request: asked.append(request.url))
+        assert HOSTILE in seen([text(page, "notice")])
+        for k, show in enumerate(("reversals_predicted", "status")):
+            control(page, "show", "select").select_option(index=k)
+            page.wait_for_url(re.compile(f"show={show}"))
+            assert HOSTILE in seen([tip(page, 1, 1)])
+            page.locator("#cell td").first.wait_for()
+            assert HOSTILE in seen([text(page, "cell")])
+            control(page, "n0", ".noUi-handle").hover()
+            page.mouse.down()
+            page.mouse.move(10, 10)
+            page.mouse.up()
+        page.wait_for_timeout(1000)
+        for where in ("h1", ".bk-slider-title"):
+            assert HOSTILE in seen(page.locator(where).all_inner_texts())
+        assert page.locator("a[href], img").count() == 0
+        assert page.evaluate("window.hacked") is None
+        assert [url for url in asked if not url.startswith(place)] == []
+        page.close()
+
+
+def seen(texts: list[str]) -> str:
+    """What can be read: a word joiner has no width."""
+    return " ".join(" ".join(texts).replace("\N{WORD JOINER}", "").split())
 
 
 # ---- who may come in
