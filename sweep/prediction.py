@@ -9,20 +9,20 @@ import numpy as np
 
 from sweep.grid import Array, Grid
 from sweep.jit import on_all_threads, threads
-from sweep.kernels.build import build_foreseen
+from sweep.kernels.build import build_estimates
 from sweep.kernels.measures import chosen
-from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.ladder import analytic, slip, slow
 from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
-from sweep.models.slow.foresee import foresee
+from sweep.models.slow.estimate import estimate
 from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
 
-# Most cells that a thread foresees at once.  A cell takes 0.1 ms; while the last ones finish, lanes are idle.
+# Most cells that a thread estimates at once.  A cell takes 0.1 ms; while the last ones finish, lanes are idle.
 _SOME = 512
 
 # Bodies whose eigenvalues are found at once (about 60 MB); a body takes 0.1 ms.
@@ -48,11 +48,11 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     Parameters
     ----------
     measure : specs of the measurements to be predicted: the time of the first reversal if "reversal_times" is among
-        them, and the count by the slow equations if "foreseen" is, or for their own model "reversals"
+        them, and the count by the slow equations if "estimate" is, or for their own model "reversals"
     """
     found = _formulas(tier, grid)
     if tier is slow.MODEL and Reversals.name in measure:
-        found |= foreseen(slip.MODEL, grid.columns())
+        found |= estimates(slip.MODEL, grid.columns())
     if not isinstance(tier, Model):
         return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
     bodies, place = grid.bodies()
@@ -62,8 +62,8 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
         found["n_c1_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan).T
     if REVERSAL_TIME in tier.offers and any(isinstance(each, ReversalTimes) for each in chosen(measure)):
         found["t_first_reversal_predicted"] = _first_reversal(tier, grid.columns(), n_c1[:, place])
-    if Foreseen.name in measure:
-        found |= foreseen(tier, grid.columns())
+    if Estimate.name in measure:
+        found |= estimates(tier, grid.columns())
     return Prediction(found, n_c1, ranges[:, place])
 
 
@@ -81,15 +81,15 @@ def _first_reversal(model: Model, columns: Columns, n_c1: Array) -> Array:
     return time
 
 
-def foreseen(model: Model, columns: Columns, *, check: bool = True) -> dict[str, Array]:
-    """Return the counts by the slow equations, computed on all threads; `check` as for `foresee`."""
-    build_foreseen(model)
+def estimates(model: Model, columns: Columns, *, check: bool = True) -> dict[str, Array]:
+    """Return the counts by the slow equations, computed on all threads; `check` as for `estimate`."""
+    build_estimates(model)
     size = len(next(iter(columns.values())))
     rounds = max(1, -(-size // (_SOME * threads())))
     together = max(1, -(-size // (rounds * threads())))
     parts = [slice(begin, begin + together) for begin in range(0, size, together)]
-    found = on_all_threads(lambda some: foresee(model, {k: v[some] for k, v in columns.items()}, check=check), parts)
-    return dict(zip(Foreseen.variables, map(np.concatenate, zip(*found, strict=True)), strict=True))
+    found = on_all_threads(lambda some: estimate(model, {k: v[some] for k, v in columns.items()}, check=check), parts)
+    return dict(zip(Estimate.variables, map(np.concatenate, zip(*found, strict=True)), strict=True))
 
 
 def decay_times(model: Model, grid: Grid) -> Array:

@@ -67,9 +67,9 @@ def over(lives: Lives, rows: Array) -> Array:
     """
     rules, run = lives.cells.rules, lives.take(rows)
     early = too_early(run, lives.notes["wary"][rows] == 0)
-    foreseen = settle(run, ~early & rules.settles)
+    predicted = settle(run, ~early & rules.settles)
     first = (lives.notes["leg"][rows] == FIRST) & ~early & (rules.settles and rules.first_leg is not None)
-    later = first & _late(run) & (foreseen | winds_down(run))
+    later = first & _late(run) & (predicted | winds_down(run))
     lives.cells.images[rows] = run.images
     _go_on(lives, rows[early], settles=False)
     _go_on(lives, rows[later], settles=True)
@@ -137,9 +137,9 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
     left = endings(table, late)
     error, fastest = _error(cells)
     final = (left.reversals == 0) & (left.nearest_approach > error * fastest)
-    foreseen = late & ~final & np.isfinite(left.reversals) & (error < _LARGEST)
-    table["status"][late & ~foreseen & (final | (cells.recorded(WOUND) > 0))] = SETTLED
-    return np.asarray(foreseen)
+    predicted = late & ~final & np.isfinite(left.reversals) & (error < _LARGEST)
+    table["status"][late & ~predicted & (final | (cells.recorded(WOUND) > 0))] = SETTLED
+    return np.asarray(predicted)
 
 
 def _error(cells: Cells) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Count the reversals of bodies that differ from the dataset's: foreseen at once, then simulated."""
+"""Count the reversals of bodies that differ from the dataset's: estimated at once, then simulated."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from sweep.kernels import measures
 from sweep.kernels.status import IMPOSSIBLE, SETTLED
 from sweep.models.model import ENDING
 from sweep.plots import labels
-from sweep.prediction import foreseen
+from sweep.prediction import estimates
 
-COUNT = "reversals_foreseen"
+COUNT = "reversals_estimated"
 """The variable of the maps, until it is simulated everywhere."""
 
 _MOST = 64
@@ -86,7 +86,7 @@ def can_change(setup: Setup | None, source: Source) -> Cell:
 
 
 def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -> Iterator[Counts]:
-    """Yield the map of counts of a state: of few cells and of all as foreseen, then with ever more simulated ones."""
+    """Yield the map of counts of a state: of few cells and of all as estimated, then with ever more simulated ones."""
     axes = {name: source.axes[name].values for name in (state.y, state.x) if name}
     every = {name: -(-len(values) // _MOST) for name, values in axes.items()}
     taken = np.meshgrid(*(values[:: every[name]] for name, values in axes.items()), indexing="ij")
@@ -114,7 +114,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         some = place[tuple(slice(None, None, spread) for _ in shape)]
         theirs = {name: values[some.ravel()] for name, values in columns.items()}
         with all_threads():
-            values = foreseen(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
+            values = estimates(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
         found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
         yield (last := labelled())
     yield from _resting(last)
@@ -142,7 +142,7 @@ def changes(source: Source, changed: Cell) -> str:
 
 
 def _words(share: float) -> str:
-    return "simulated" if share == 1.0 else f"foreseen, {share:.0%} simulated" if share else "foreseen"
+    return "simulated" if share == 1.0 else f"estimated, {share:.0%} simulated" if share else "estimated"
 
 
 def _of_cells(config: Config, columns: Mapping[str, Array], axes: tuple[str, ...]) -> Config:

@@ -79,7 +79,7 @@ class Source:
         """Names of the variables with one number per cell; counts and derived quantities come first."""
         names = [str(n) for n, v in self.cell.data_vars.items() if v.dims and set(v.dims) <= set(self.axes)]
         names = [n for n in names if self.cell[n].dtype.kind in "fiub"]
-        counts = ("reversals", "reversals_foreseen", "reversals_predicted")
+        counts = ("reversals", "reversals_estimated", "reversals_predicted")
         first = (*counts, *quantities.DERIVED, "status", "t_stop", "t_last_reversal")
         return [*(n for n in first if n in names), *(n for n in names if n not in first)]
 

@@ -54,7 +54,7 @@ class State:
     limits: Mapping[str, float] = field(default_factory=dict)
     """Ends of the colour scale that the visitor has chosen; the values determine the others."""
     changed: Cell = field(default_factory=dict)
-    """Parameters with other values than in the dataset, for which counts are foreseen."""
+    """Parameters with other values than in the dataset, for which counts are estimated."""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ class View:
         self.state, self._faults = states.read(query, source, self._base, self._known)
         self._constants = bodies.can_change(setup, source)
         if self.state.changed and not self._constants:
-            self._faults.append("with: counts of other bodies cannot be foreseen here")
+            self._faults.append("with: counts of other bodies cannot be estimated here")
             self.state = replace(self.state, changed={})
         self._build()
         self._runner = runner

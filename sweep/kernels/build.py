@@ -2,7 +2,7 @@
 
 The arguments of such a process are PIECE METHOD MODEL [MEASURE …]. A PIECE is `kernel`, or another part that runs need:
 `images` and `endings`, `path` for single trajectories, `approach` once a trajectory has failed, and `exchange` and
-`follow` for foreseen counts. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line
+`follow` for estimated counts. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line
 of standard input.
 
 Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
@@ -29,13 +29,13 @@ from sweep.interrupt import point
 from sweep.jit import Cached, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
 from sweep.models import find
 from sweep.models.model import ENDING, Model
 from sweep.models.origin import Origin
-from sweep.models.slow.foresee import compiled_exchange, compiled_follow
+from sweep.models.slow.estimate import compiled_exchange, compiled_follow
 from sweep.models.stiff.final_spin import compiled_following
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
@@ -91,8 +91,8 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
             _compile(jobs)
 
 
-def build_foreseen(model: Model) -> None:
-    """Compile what foresees the counts of `model`, as `build` compiles its kernels, if the cache lacks it."""
+def build_estimates(model: Model) -> None:
+    """Compile what estimates the counts of `model`, as `build` compiles its kernels, if the cache lacks it."""
     if jobs := [(piece, model.origin) for piece in _lacking(make_kernel(PLAIN, model, ()), (_EXCHANGE, _FOLLOW))]:
         with compiling():
             _compile(jobs)
@@ -121,8 +121,8 @@ def try_compiling(model: Model) -> None:
 
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
-    foreseen = [_EXCHANGE, _FOLLOW] if Foreseen.name in kernel.measure else []
-    return _lacking(kernel, (*foreseen, KERNEL, IMAGES, ENDINGS, *also))
+    estimated = [_EXCHANGE, _FOLLOW] if Estimate.name in kernel.measure else []
+    return _lacking(kernel, (*estimated, KERNEL, IMAGES, ENDINGS, *also))
 
 
 def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]:

@@ -15,7 +15,7 @@ from sweep.results.kind import is_of_own_body, parameters
 from sweep.units import SUPERSCRIPT, is_of_paper, pretty
 from sweep.variables import Variable
 
-_ORIGIN = re.compile(", (simulated|foreseen|predicted.*)$")
+_ORIGIN = re.compile(", (simulated|estimated|predicted.*)$")
 """The end of the words for a variable that has a prediction."""
 
 _RECORDS: Mapping[str, Parameter | Variable] = {**PARAMETERS, **VARIABLES}
@@ -40,7 +40,7 @@ def words(dataset: xr.Dataset, name: str) -> str:
 
 
 def origin(dataset: xr.Dataset, name: str) -> str:
-    """Return whether a variable is simulated, foreseen or predicted."""
+    """Return whether a variable is simulated, estimated or predicted."""
     found = _ORIGIN.search(words(dataset, name))
     return found[1] if found else "simulated"
 

@@ -13,7 +13,7 @@ import xarray as xr
 from sweep.config import Config
 from sweep.faults import either, fault_of, refusal, suggestion
 from sweep.kernels.measures import MEASURES
-from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.measures.reversals import Reversals
 from sweep.plots import labels
 from sweep.results.dataset import VARIABLES
@@ -104,8 +104,8 @@ def pictured(dataset: xr.Dataset) -> list[str]:
 def check_pictures(config: Config) -> None:
     """Raise a `InputError` if a configuration names a picture of a variable that its run does not have."""
     comes_with = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
-    if config.tier.counts in Foreseen.variables:  # the reversals of this tier are foreseen
-        comes_with |= dict.fromkeys(Foreseen.variables, Reversals.name)
+    if config.tier.counts in Estimate.variables:  # the reversals of this tier are estimated
+        comes_with |= dict.fromkeys(Estimate.variables, Reversals.name)
     measured = {spec.partition("=")[0] for spec in config.measure}
     known = {*VARIABLES, *PROBABILITIES, *DERIVED}
     for i, name in enumerate(config.picture):

@@ -16,7 +16,7 @@ from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
 
-REVERSALS = ("reversals", "reversals_foreseen", "reversals_predicted", "difference")
+REVERSALS = ("reversals", "reversals_estimated", "reversals_predicted", "difference")
 """The variables that theory explains."""
 
 _SOURCES = {

@@ -28,7 +28,7 @@ from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models.model import COUNT, ENDING
-from sweep.prediction import foreseen
+from sweep.prediction import estimates
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
@@ -248,7 +248,7 @@ class Along(Boundaries):
         columns |= {self.along.name: places}
         possible = ~self.config.equations.impossible(columns)
         at, places, columns = at[possible], places[possible], {name: each[possible] for name, each in columns.items()}
-        counts = foreseen(self.config.equations, columns, check=False)["reversals_foreseen"]
+        counts = estimates(self.config.equations, columns, check=False)["reversals_estimated"]
         ends = [0, *(np.flatnonzero(np.diff(counts)) + 1), len(at)]
         between = [(first + last) // 2 for first, last in pairwise(ends) if (at[first:last] % parts).all()]
         return np.sort(np.concatenate([values, places[between]]))

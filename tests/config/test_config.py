@@ -189,10 +189,10 @@ def test_the_default_time_of_bodies_in_si(read: Read) -> None:
     assert config.integrator.t_end == 1400
     assert 1300 < 30_000 * np.sqrt(0.02 / 9.81) < 1400
     assert read(config.to_yaml()) == config
-    foreseen = read("body: {offset: 0.1, c: 0.5}\nfriction: {mu: 6}").integrator
-    assert (foreseen.stop_early, foreseen.t_end) == (30_000, 1e6)
+    estimated = read("body: {offset: 0.1, c: 0.5}\nfriction: {mu: 6}").integrator
+    assert (estimated.stop_early, estimated.t_end) == (30_000, 1e6)
     toy = "units: SI\nbody: {a: 0.1, b: 0.03, c: 0.02, mass: 1, Ixx: 2e-4, Iyy: 1e-3, Izz: 1e-3}\nfriction: {mu: 30}\n"
-    foreseen = read(toy + "start: {n0: 1, x0: 1e-3, y0: 1e-3}").integrator
-    assert (foreseen.stop_early, foreseen.t_end) == (1400, 45_200)
+    estimated = read(toy + "start: {n0: 1, x0: 1e-3, y0: 1e-3}").integrator
+    assert (estimated.stop_early, estimated.t_end) == (1400, 45_200)
     assert 45_100 < 1e6 * np.sqrt(0.02 / 9.81) < 45_200
     assert read(STONE).integrator.t_end == 5

@@ -121,7 +121,7 @@ def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_failure_is_approached_beyond_where_the_cell_settled_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The slow equations may foresee a reversal of such a cell, so it goes on, and may fail then."""
+    """The slow equations may estimate a reversal of such a cell, so it goes on, and may fail then."""
     cell = {"name": "late", "cases": {n: [v] for n, v in STANDARD.items()}, "integrator": {"method": "dopri5"}}
     (part,), begun = plan(sweep.load_config(cell)).parts, []
 

@@ -1,4 +1,4 @@
-"""Counts of bodies that a dataset does not have: foreseen as by `predict`, and in the end those of a run."""
+"""Counts of bodies that a dataset does not have: estimated as by `predict`, and in the end those of a run."""
 
 from dataclasses import replace
 from typing import Any
@@ -31,15 +31,17 @@ def test_counts_are_foreseen_and_then_simulated(drag: dict[str, float]) -> None:
     shown = replace(state.first(source), changed={"delta": 0.05})
     coarse, fine, *_, last = found = list(dict.fromkeys(bodies.counts(setup, source, shown)))
     other = RUN | {"body": {"b": RUN["body"]["b"], "delta": 0.05}} | friction
-    foreseen = sweep.predict(other | {"measure": ["reversals", "foreseen"]})[COUNT].transpose(*last.dataset[COUNT].dims)
-    np.testing.assert_array_equal(fine.dataset[COUNT], foreseen)
-    np.testing.assert_array_equal(coarse.dataset[COUNT], foreseen[[0, 0, 0, 0, 4]][:, [0, 0, 0, 0, 4]])
+    estimated = sweep.predict(other | {"measure": ["reversals", "estimate"]})[COUNT].transpose(
+        *last.dataset[COUNT].dims
+    )
+    np.testing.assert_array_equal(fine.dataset[COUNT], estimated)
+    np.testing.assert_array_equal(coarse.dataset[COUNT], estimated[[0, 0, 0, 0, 4]][:, [0, 0, 0, 0, 4]])
     for name, of_run in ((COUNT, "reversals"), ("status", "status")):
         simulated = sweep.run(other)[of_run].transpose(*last.dataset[name].dims)
         np.testing.assert_array_equal(last.dataset[name], simulated, name)
     assert (last.dataset["status"].sel(b=0.5) == IMPOSSIBLE).all()
     assert [each.whole for each in found] == [*[False] * (len(found) - 1), True]
-    assert fine.dataset[COUNT].attrs["long_name"] == "spin reversals, foreseen, δ = 0.05 rad"
+    assert fine.dataset[COUNT].attrs["long_name"] == "spin reversals, estimated, δ = 0.05 rad"
     assert last.dataset[COUNT].attrs["long_name"] == "spin reversals, simulated, δ = 0.05 rad"
 
 

@@ -68,12 +68,12 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
 
 def test_foreseen_counts_have_pieces_of_their_own(started: list[tuple[str, ...]]) -> None:
     """What follows the slow equations is the same for all models; a prediction needs no kernel."""
-    foreseen = [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
-    build([kernel(measure=("reversals", "foreseen"))])
-    assert started[:3] == [*foreseen, ("kernel", "dopri5", "slip", "reversals", "round_off", "decay")]
+    estimated = [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
+    build([kernel(measure=("reversals", "estimate"))])
+    assert started[:3] == [*estimated, ("kernel", "dopri5", "slip", "reversals", "round_off", "decay")]
     started.clear()
-    sweep.predict({"friction": {"mu": 60}}, measure=["foreseen"])
-    assert started == foreseen
+    sweep.predict({"friction": {"mu": 60}}, measure=["estimate"])
+    assert started == estimated
 
 
 def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
@@ -174,7 +174,7 @@ import numpy as np, sweep
 random = np.random.default_rng(5)
 drawn = {"b": random.uniform(1.5, 9.5, 300), "mu": random.uniform(500, 4000, 300), "n0": random.uniform(0.05, 0.2, 300)}
 cases = {name: values.tolist() for name, values in drawn.items()}
-print(sweep.predict({"cases": cases}, measure=["foreseen"])["reversals_foreseen"].values.tolist())
+print(sweep.predict({"cases": cases}, measure=["estimate"])["reversals_estimated"].values.tolist())
 """
     first, second = (python("-c", program, NUMBA_CACHE_DIR=str(tmp_path)).stdout for _ in range(2))
     assert first == second

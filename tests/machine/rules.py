@@ -182,7 +182,7 @@ class Machine(RuleBasedStateMachine):
         base=st.sampled_from(sorted(draws.shipped())),
         changes=draws.draws([*draws.PHYSICAL, *3 * draws.OTHERWISE], 6, 2),
     )
-    def foresee(self, base: str, changes: Draws) -> None:
+    def estimate(self, base: str, changes: Draws) -> None:
         """Any configuration, whatever its kernel, is predicted and estimated."""
         drawn = {path: draws.setting(path, n) for path, n in changes}
         scene = Scene(*draws.accepted(draws.shipped()[base] | drawn, base))

@@ -9,14 +9,14 @@ import sweep
 from sweep.jit import compiled
 from sweep.models.ladder import slip
 from sweep.models.slow import elementary, follow
-from sweep.models.slow import foresee as slow
+from sweep.models.slow import estimate as slow
 from sweep.models.slow.exchange import RESONANT, SECOND, TERMS, THIRD, make_exchange
 from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory import linear
 from sweep.plots import quantities
 from sweep.prediction import predict
 
-MEASURE = ["reversals", "margin", "foreseen"]
+MEASURE = ["reversals", "margin", "estimate"]
 LINE: dict[str, Any] = {"body": {"b": {"start": 1.5, "stop": 9.5, "num": 9}}, "friction": {"mu": [30, 80, 150]}}
 
 
@@ -43,18 +43,18 @@ def test_the_matrix_has_the_eigenvalues_of_the_full_model() -> None:
 
 @pytest.mark.parametrize(("n0", "share"), [(0.02, 1.0), (0.05, 0.85)])
 def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
-    asked = LINE | {"start": {"n0": n0}, "measure": ["reversals", "foreseen"]}
+    asked = LINE | {"start": {"n0": n0}, "measure": ["reversals", "estimate"]}
     found = sweep.run(asked)
-    right = (found.reversals == found.reversals_foreseen).values
+    right = (found.reversals == found.reversals_estimated).values
     assert right.mean() >= share
-    assert right[found.foreseen_sure.values == 1].all()
-    assert found.foreseen_sure.mean() > 0.4
+    assert right[found.estimate_certain.values == 1].all()
+    assert found.estimate_certain.mean() > 0.4
     # The formula alone is right in a third of these.
     assert right.mean() > (found.reversals == found.reversals_predicted).mean() + 0.2
-    assert found.reversals_foreseen.identical(sweep.predict(asked).reversals_foreseen)
+    assert found.reversals_estimated.identical(sweep.predict(asked).reversals_estimated)
     alone = sweep.run(LINE | {"start": {"n0": n0}, "model": "slow"})
-    np.testing.assert_array_equal(alone.reversals, found.reversals_foreseen)
-    np.testing.assert_array_equal(alone.reversals_foreseen, found.reversals_foreseen)
+    np.testing.assert_array_equal(alone.reversals, found.reversals_estimated)
+    np.testing.assert_array_equal(alone.reversals_estimated, found.reversals_estimated)
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
 )  # fmt: skip
 def test_counts_of_hard_cells(given: dict[str, float], what: str) -> None:
     case = {name: values.tolist() for name, values in columns(**given).items()}
-    found = sweep.run({"cases": case, "measure": ["reversals", "foreseen"], "integrator": {"method": "auto"}})
-    assert found.reversals_foreseen == found.reversals, what
+    found = sweep.run({"cases": case, "measure": ["reversals", "estimate"], "integrator": {"method": "auto"}})
+    assert found.reversals_estimated == found.reversals, what
 
 
 @pytest.mark.parametrize("sigma", [1e-3, 1e-2, 0.1])
@@ -80,30 +80,30 @@ def test_counts_of_a_body_that_a_couple_slows(sigma: float) -> None:
     """It reverses less often the stronger the couple is."""
     friction = {"mu": [30, 80, 150], "sigma": sigma}
     found = sweep.run(LINE | {"friction": friction, "start": {"n0": 0.05}, "measure": MEASURE})
-    certain, right = found.certain == 1, found.reversals == found.reversals_foreseen
+    certain, right = found.certain == 1, found.reversals == found.reversals_estimated
     assert float(right.where(certain).mean()) > 0.85
-    assert float(right.where(certain & (found.foreseen_sure == 1)).mean()) == 1
-    assert float(found.foreseen_sure.mean()) > 0.3
+    assert float(right.where(certain & (found.estimate_certain == 1)).mean()) == 1
+    assert float(found.estimate_certain.mean()) > 0.3
 
 
 def test_a_count_whose_last_reversal_a_drag_may_prevent_is_not_sure() -> None:
     """Six by an independent integration too: the tiny mode that would turn the spin again grows back too early."""
     found = sweep.run({"body": {"b": 3.0}, "friction": {"mu": 160.0, "sigma": 9.9727e-4}, "start": {"n0": 0.05},
                        "measure": MEASURE})  # fmt: skip
-    assert (found.reversals, found.reversals_foreseen, found.foreseen_sure) == (6, 7, 0)
+    assert (found.reversals, found.reversals_estimated, found.estimate_certain) == (6, 7, 0)
 
 
 def test_a_mode_that_fell_far_makes_no_count_sure() -> None:
     """In the first body it falls below 1e-8; all other conditions hold for both."""
     config = sweep.load_config({"body": {"b": [3.0, 4.0]}, "friction": {"mu": 150.0}, "start": {"n0": 0.02}})
-    assert slow.foresee(config.equations, config.grid.columns()).sure.tolist() == [False, True]
+    assert slow.estimate(config.equations, config.grid.columns()).sure.tolist() == [False, True]
 
 
 def test_a_couple_makes_a_count_unsure_that_a_small_mode_decides() -> None:
-    """The spin falls below the critical one while the mode that would reverse it is still tiny; it is foreseen to."""
+    """The spin falls below the critical one while the mode that would reverse it is still tiny; it is estimated to."""
     found = sweep.run({"body": {"b": 4.2}, "friction": {"mu": 109.0909, "sigma": 1e-3}, "start": {"n0": 0.02},
                        "measure": MEASURE})  # fmt: skip
-    assert (found.reversals, found.reversals_foreseen, found.foreseen_sure) == (2, 3, 0)
+    assert (found.reversals, found.reversals_estimated, found.estimate_certain) == (2, 3, 0)
 
 
 def test_a_cell_is_the_same_alone_and_mirrored() -> None:
@@ -111,11 +111,11 @@ def test_a_cell_is_the_same_alone_and_mirrored() -> None:
     b, mu, n0 = [1.6, 4.0, 7.0, 9.0, 9.0], [40.0, 60.0, 120.0, 90.0, 90.0], [0.05, -0.05, 0.08, 0.03, 0.0]
     some = columns(b=b, mu=mu, n0=n0, x0=[0.01] * 4 + [0.0], y0=[0.01] * 4 + [0.0])
     some = {name: np.broadcast_to(values, 5).copy() for name, values in some.items()}
-    together = slow.foresee(slip.MODEL, some)
-    mirrored = slow.foresee(slip.MODEL, some | {name: -some[name] for name in ("delta", "n0", "y0")})
+    together = slow.estimate(slip.MODEL, some)
+    mirrored = slow.estimate(slip.MODEL, some | {name: -some[name] for name in ("delta", "n0", "y0")})
     np.testing.assert_array_equal(together.reversals, mirrored.reversals)
     for i in range(5):
-        one = slow.foresee(slip.MODEL, {name: values[i : i + 1] for name, values in some.items()})
+        one = slow.estimate(slip.MODEL, {name: values[i : i + 1] for name, values in some.items()})
         assert one.reversals[0] == together.reversals[i]
         assert one.sure[0] == together.sure[i]
 
@@ -129,8 +129,8 @@ def test_a_cell_is_the_same_in_another_lane(sigma: float) -> None:
     if sigma:
         config = sweep.load_config({"friction": {"mu": 60.0, "sigma": sigma}})
         model, some = config.equations, some | {"sigma": np.full(82, sigma)}
-    forward = slow.foresee(model, some)
-    back = slow.foresee(model, {name: values[::-1].copy() for name, values in some.items()})
+    forward = slow.estimate(model, some)
+    back = slow.estimate(model, {name: values[::-1].copy() for name, values in some.items()})
     np.testing.assert_array_equal(forward.reversals, back.reversals[::-1])
     np.testing.assert_array_equal(forward.sure, back.sure[::-1])
     assert np.unique(forward.reversals).size > 3
@@ -142,16 +142,16 @@ def test_a_round_body_does_not_beat(size: float) -> None:
     offsets = [0.0, 1e-15, 1e-13, 1e-10]
     round_ones = columns(a=np.full(4, size), b=size * (1 - np.array(offsets)), mu=np.full(4, 60.0))
     round_ones = {name: np.broadcast_to(values, 4).copy() for name, values in round_ones.items()}
-    assert not slow.foresee(slip.MODEL, round_ones).reversals.any()
+    assert not slow.estimate(slip.MODEL, round_ones).reversals.any()
 
 
 def test_bodies_without_two_rocking_modes_are_not_sure() -> None:
     """One that cannot stand, also alone, one that hardly slips, and one that is nearly round."""
     some = columns(b=[0.5, 3.0, 1.00001], mu=[60.0, 1e-4, 60.0])
-    found = slow.foresee(slip.MODEL, {name: np.broadcast_to(values, 3).copy() for name, values in some.items()})
+    found = slow.estimate(slip.MODEL, {name: np.broadcast_to(values, 3).copy() for name, values in some.items()})
     assert not found.sure.any()
     assert (found.reversals[:2] == 0).all()
-    alone = slow.foresee(slip.MODEL, columns(b=0.5))
+    alone = slow.estimate(slip.MODEL, columns(b=0.5))
     assert (alone.reversals, alone.sure) == (0, False)
 
 
@@ -160,14 +160,14 @@ def test_a_count_that_the_start_spin_decides_is_not_sure() -> None:
     case = {"mu": [140.0, 132.0], "b": [5.6, 6.0], "n0": [0.02, 0.05]}
     found = sweep.run({"cases": case, "measure": MEASURE})
     assert found.reversals.values.tolist() == [3, 8]
-    assert found.reversals_foreseen.values.tolist() == [4, 7]
-    assert not found.foreseen_sure.any()
+    assert found.reversals_estimated.values.tolist() == [4, 7]
+    assert not found.estimate_certain.any()
 
 
 def test_a_mode_that_harmonics_of_the_other_drive_is_not_sure() -> None:
     """Its frequency is five times that of the other: the full model reverses ten times."""
     body = {"a": 9.177403, "b": 0.899823, "c": 0.575785, "delta": -0.189866, "mu": 46.871297}
-    found = slow.foresee(slip.MODEL, columns(**body, n0=-0.061097, x0=-0.502401, y0=-0.021362))
+    found = slow.estimate(slip.MODEL, columns(**body, n0=-0.061097, x0=-0.502401, y0=-0.021362))
     assert found.reversals < 10
     assert not found.sure
 
@@ -175,11 +175,11 @@ def test_a_mode_that_harmonics_of_the_other_drive_is_not_sure() -> None:
 def test_a_start_by_angles_and_rates_is_foreseen() -> None:
     """The same motion as by n0, x0 and y0 where the body spins about the vertical; and another one that is pushed."""
     start = {"roll": 0.01, "pitch": 0.002, "omega3": [-0.05, 0.05], "omega1": [0.0, 0.01]}
-    found = sweep.run(LINE | {"start": start, "measure": ["reversals", "margin", "foreseen"]})
-    right, certain = (found.reversals == found.reversals_foreseen).values, found.certain.values == 1
+    found = sweep.run(LINE | {"start": start, "measure": ["reversals", "margin", "estimate"]})
+    right, certain = (found.reversals == found.reversals_estimated).values, found.certain.values == 1
     assert right[certain].mean() > 0.8
-    assert found.foreseen_sure.values.any()
-    assert right[certain & (found.foreseen_sure.values == 1)].all()
+    assert found.estimate_certain.values.any()
+    assert right[certain & (found.estimate_certain.values == 1)].all()
 
 
 def test_a_body_in_si_has_the_same_counts() -> None:
@@ -191,26 +191,26 @@ def test_a_body_in_si_has_the_same_counts() -> None:
     asked = {
         "units": "SI", "body": {"a": 10 * length, "b": b.tolist(), "c": length, "delta": 0.03, "mass": 1.0},
         "friction": {"mu": [mu / (length * rate) for mu in (30, 80, 150)]},
-        "start": {"n0": 0.05 * rate, "x0": 0.01 * length, "y0": 0.01 * length}, "measure": ["reversals", "foreseen"],
+        "start": {"n0": 0.05 * rate, "x0": 0.01 * length, "y0": 0.01 * length}, "measure": ["reversals", "estimate"],
     }  # fmt: skip
-    np.testing.assert_array_equal(sweep.predict(asked).reversals_foreseen.values, paper.reversals_foreseen.values)
+    np.testing.assert_array_equal(sweep.predict(asked).reversals_estimated.values, paper.reversals_estimated.values)
 
 
 def test_its_counts_are_called_foreseen() -> None:
     """They are not simulated; a run that measures both has simulated ones as well, and a formula's are predicted."""
     alone = sweep.run(LINE | {"model": "slow"})
-    assert alone.reversals.attrs["long_name"] == alone.reversals_foreseen.attrs["long_name"]
+    assert alone.reversals.attrs["long_name"] == alone.reversals_estimated.attrs["long_name"]
     formula = sweep.run(LINE | {"model": "analytic"})
     assert formula.reversals.attrs["description"] == "Spin reversals predicted by Takano (2011), cases (I) and (II)."
-    both = sweep.run({"friction": {"mu": [60, 80]}, "measure": ["reversals", "foreseen"]})
-    assert quantities.field(alone, "difference").attrs["long_name"] == "foreseen − predicted"
+    both = sweep.run({"friction": {"mu": [60, 80]}, "measure": ["reversals", "estimate"]})
+    assert quantities.field(alone, "difference").attrs["long_name"] == "estimated − predicted"
     assert quantities.field(both, "difference").attrs["long_name"] == "simulated − predicted"
 
 
 def test_counts_are_not_foreseen_for_critical_spins_alone() -> None:
     config = sweep.load_config(LINE | {"model": "slow"})
-    assert "reversals_foreseen" not in predict(config.tier, config.grid).variables
-    assert "reversals_foreseen" in predict(config.tier, config.grid, config.measure).variables
+    assert "reversals_estimated" not in predict(config.tier, config.grid).variables
+    assert "reversals_estimated" in predict(config.tier, config.grid, config.measure).variables
 
 
 @pytest.mark.parametrize("b", [3.0, 6.4])
@@ -302,6 +302,6 @@ def test_the_steps_are_vector_instructions() -> None:
 
 def test_the_model_draws_what_it_foresees_and_measures_counts_alone() -> None:
     asked: dict[str, Any] = {"model": "slow", "friction": {"mu": 60}}
-    assert sweep.load_config(asked | {"picture": ["foreseen_sure"]}).picture == ("foreseen_sure",)
+    assert sweep.load_config(asked | {"picture": ["estimate_certain"]}).picture == ("estimate_certain",)
     with pytest.raises(sweep.InputError, match=r"margin cannot be measured .*; choose from reversals$"):
         sweep.load_config(asked | {"measure": ["reversals", "margin"]})

@@ -19,7 +19,7 @@ from sweep.results import netcdf, provenance
 from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.writing import replacing
 
-NOT_BY_DEFAULT = """method t_first_reversal_predicted reversal_times reversals_foreseen foreseen_sure n_c2_simulated
+NOT_BY_DEFAULT = """method t_first_reversal_predicted reversal_times reversals_estimated estimate_certain n_c2_simulated
 n_c2_bracket n_c_reason"""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from sweep.kernels.measures.decay import Decay
 from sweep.kernels.measures.energy import EnergyError
-from sweep.kernels.measures.foreseen import Foreseen
+from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.measures.noise import RoundOff
@@ -16,7 +16,7 @@ from sweep.kernels.measures.reversals import Reversals
 from sweep.models.model import Model, Tier
 
 _KINDS: tuple[type[Measurement], ...] = (
-    Reversals, EnergyError, Margin, RestingSpin, ReversalTimes, Foreseen,
+    Reversals, EnergyError, Margin, RestingSpin, ReversalTimes, Estimate,
 )  # fmt: skip
 
 MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}

@@ -2,7 +2,7 @@
 
 The rattle is a sum of two rocking modes.  Their amplitudes and phases, and how they turn the spin, follow from the full
 model, to third order in the amplitudes, and to fourth order for the spin (`sweep.models.slow.exchange`).  Nothing is
-simulated: `sweep.models.slow.foresee` gives the count.
+simulated: `sweep.models.slow.estimate` gives the count.
 """
 
 from __future__ import annotations
@@ -16,6 +16,6 @@ MODEL = Tier(
     parameters=slip.MODEL.parameters,
     positive=frozenset({"mu"}),
     offers=frozenset({COUNT, FORMULAS}),
-    counts="reversals_foreseen",
+    counts="reversals_estimated",
     impossible=slip.MODEL.impossible,
 )

@@ -1,1 +1,1 @@
-"""The slow equations of a rattleback: two complex amplitudes and the spin, for counts that are foreseen."""
+"""The slow equations of a rattleback: two complex amplitudes and the spin, for counts that are estimated."""

@@ -1,10 +1,10 @@
-"""How often the slow equations foresee the count of the full model, and how fast.
+"""How often the slow equations estimate the count of the full model, and how fast.
 
-    python scripts/foreseen.py mu_b               the cells of `configs/mu_b.yaml`
-    python scripts/foreseen.py wide CELLS SEED    random cells: a/c 1.5 to 50, μ 0.1 to 5000, n0 0.005 to 0.2
-    python scripts/foreseen.py slowed CELLS SEED  the same with σ from 1e-5 to 0.3
+    python scripts/estimates.py mu_b               the cells of `configs/mu_b.yaml`
+    python scripts/estimates.py wide CELLS SEED    random cells: a/c 1.5 to 50, μ 0.1 to 5000, n0 0.005 to 0.2
+    python scripts/estimates.py slowed CELLS SEED  the same with σ from 1e-5 to 0.3
 
-Shares of certain counts that are foreseen rightly and within one, by the start spin; of those called sure; and the same
+Shares of decided counts that are estimated rightly and within one, by the start spin; of those called sure; and the same
 for the formula of Takano (2011), which has no σ.
 """
 
@@ -21,7 +21,7 @@ import xarray as xr
 import sweep
 
 ROOT = Path(__file__).parents[1]
-MEASURE = ["reversals", "margin", "foreseen"]
+MEASURE = ["reversals", "margin", "estimate"]
 
 
 def wide(cells: int, seed: int, slowed: bool) -> dict[str, Any]:
@@ -54,15 +54,15 @@ def wide(cells: int, seed: int, slowed: bool) -> dict[str, Any]:
 def say(words: str, found: xr.Dataset, where: Any) -> None:
     """Print the shares over the cells `where`."""
     where &= found["certain"].values == 1
-    counts, sure = found["reversals"].values.astype(int)[where], found["foreseen_sure"].values[where] == 1
+    counts, sure = found["reversals"].values.astype(int)[where], found["estimate_certain"].values[where] == 1
     shares = {}
-    for name in {"reversals_foreseen", "reversals_predicted"} & set(found):
+    for name in {"reversals_estimated", "reversals_predicted"} & set(found):
         off = np.abs(found[name].values[where] - counts)
         shares[name] = f"right {np.mean(off == 0):.1%}, within one {np.mean(off <= 1):.1%}"
-    right = found["reversals_foreseen"].values[where][sure] == counts[sure]
+    right = found["reversals_estimated"].values[where][sure] == counts[sure]
     formula = shares.get("reversals_predicted", "not for these")
     print(
-        f"{words}: {where.sum()} cells, {shares['reversals_foreseen']} (formula: {formula}); "
+        f"{words}: {where.sum()} cells, {shares['reversals_estimated']} (formula: {formula}); "
         f"sure {np.mean(sure):.1%}, right {np.mean(right):.2%}"
     )
 
@@ -71,7 +71,7 @@ def main(which: str, cells: int = 500, seed: int = 1) -> None:
     config: Any = ROOT / "configs" / "mu_b.yaml" if which == "mu_b" else wide(cells, seed, which == "slowed")
     sweep.predict(config, measure=MEASURE)  # compiles
     began = time.perf_counter()
-    size = sweep.predict(config, measure=MEASURE)["reversals_foreseen"].size
+    size = sweep.predict(config, measure=MEASURE)["reversals_estimated"].size
     print(f"{size / (time.perf_counter() - began):.0f} cells a second")
     found = sweep.run(config, measure=MEASURE)
     n0 = np.abs(xr.broadcast(found["n0"], found["reversals"])[0].transpose(*found["reversals"].dims).values)

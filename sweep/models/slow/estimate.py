@@ -44,7 +44,7 @@ _BELOW_THREE = 0.3
 _SMALL = 1e-8
 
 
-class Foreseen(NamedTuple):
+class Estimate(NamedTuple):
     """Counts by the slow equations; arrays of shape (cells,)."""
 
     reversals: Array
@@ -53,13 +53,13 @@ class Foreseen(NamedTuple):
     """Whether it stays the same if higher orders and the start spin change, and the modes are as assumed."""
 
 
-def foresee(model: Model, columns: Columns, *, check: bool = True) -> Foreseen:
+def estimate(model: Model, columns: Columns, *, check: bool = True) -> Estimate:
     """Count the reversals of trajectories by the slow equations of `model`, which has two rocking modes (`ENDING`).
 
     Without `check`, no count is sure, and it takes seven tenths of the time, or less with a couple.
     """
     size = len(next(iter(columns.values())))
-    result = Foreseen(np.zeros(size, np.int16), np.zeros(size, bool))
+    result = Estimate(np.zeros(size, np.int16), np.zeros(size, bool))
     possible = np.flatnonzero(~model.impossible(columns))
     if not len(possible):
         return result
