@@ -4,8 +4,8 @@
     python scripts/estimates.py wide CELLS SEED    random cells: a/c 1.5 to 50, μ 0.1 to 5000, n0 0.005 to 0.2
     python scripts/estimates.py slowed CELLS SEED  the same with σ from 1e-5 to 0.3
 
-Shares of certain counts that are estimated rightly and within one, by the start spin; of the estimates that are certain;
-and the same for the formula of Takano (2011), which has no σ.
+Shares of certain counts that are estimated rightly and within one, by the start spin; of the estimates that are
+certain; and the same for the formula of Takano (2011), which has no σ.
 """
 
 from __future__ import annotations
