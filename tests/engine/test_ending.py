@@ -26,7 +26,7 @@ def run() -> xr.Dataset:
     return sweep.run(SCENE)
 
 
-def test_a_cell_goes_on_if_a_reversal_can_be_foreseen(run: xr.Dataset) -> None:
+def test_a_cell_goes_on_if_a_reversal_can_be_predicted(run: xr.Dataset) -> None:
     ended = sweep.run(SCENE, t_end=30_000.0)
     assert list(ended.status) == [TIME_LIMIT, TIME_LIMIT, SETTLED]
     assert list(run.status) == [SETTLED, SETTLED, SETTLED]
@@ -126,7 +126,7 @@ def test_what_is_left_of_a_rattle_may_turn_a_spin_that_a_couple_slows() -> None:
     assert (int(weak.status), int(weak.certain)) == (SETTLED, 1)
 
 
-def test_the_end_of_a_rattle_that_outlasts_the_spin_is_foreseen() -> None:
+def test_the_end_of_a_rattle_that_outlasts_the_spin_is_predicted() -> None:
     """The couple takes the spin within a hundred units of time, and the rattle decays in thousands."""
     scene = {"friction": {"mu": 120, "sigma": 0.1}, "body": {"b": [2.0, 3.0, 5.0, 8.0]}, "start": {"n0": 0.05}}
     found, later = sweep.run(scene), sweep.run(scene, stop_early=False, t_end=1e5)

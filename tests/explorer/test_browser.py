@@ -354,7 +354,7 @@ def test_axes_variable_and_selection_change(go: Open, served: str, opened: xr.Da
     assert image(page) == difference.ravel().tolist()
 
 
-def test_another_body_is_foreseen_and_then_simulated(visit: Open, counts: np.ndarray) -> None:
+def test_another_body_is_estimated_and_then_simulated(visit: Open, counts: np.ndarray) -> None:
     """Its counts follow a slider; a click runs its trajectory; and the dataset's map returns."""
     page = visit("n0=0.05")
     before = image(page)

@@ -25,7 +25,7 @@ def a_source(**more: Any) -> tuple[Source, Setup]:
 
 
 @pytest.mark.parametrize("drag", [{}, {"sigma": 1e-3}], ids=["", "with a drag"])
-def test_counts_are_foreseen_and_then_simulated(drag: dict[str, float]) -> None:
+def test_counts_are_estimated_and_then_simulated(drag: dict[str, float]) -> None:
     friction = {"friction": RUN["friction"] | drag}
     source, setup = a_source(**friction)
     shown = replace(state.first(source), changed={"delta": 0.05})

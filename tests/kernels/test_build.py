@@ -66,7 +66,7 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     ]
 
 
-def test_foreseen_counts_have_pieces_of_their_own(started: list[tuple[str, ...]]) -> None:
+def test_estimated_counts_have_pieces_of_their_own(started: list[tuple[str, ...]]) -> None:
     """What follows the slow equations is the same for all models; a prediction needs no kernel."""
     estimated = [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
     build([kernel(measure=("reversals", "estimate"))])
@@ -167,7 +167,7 @@ def test_processes_end_with_the_one_that_started_them(
 
 
 @pytest.mark.campaign
-def test_counts_are_foreseen_alike_by_the_process_that_compiles(tmp_path: Path) -> None:
+def test_counts_are_estimated_alike_by_the_process_that_compiles(tmp_path: Path) -> None:
     """High counts, some of which depend on the last bits."""
     program = """
 import numpy as np, sweep

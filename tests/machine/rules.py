@@ -173,7 +173,7 @@ class Machine(RuleBasedStateMachine):
         note(f"# {json.dumps(self.scene.flat)}")
         self.found = self._run(self.config)
         self.rows, self.others = oracles.rows(self.found), [self.found]
-        self._foreseen(self.scene, self.found)
+        self._estimated(self.scene, self.found)
         self._reopened(self.found)
         describe(self.found), contents(self.found)
         self._drawn(self.found, arguments, at)
@@ -187,9 +187,9 @@ class Machine(RuleBasedStateMachine):
         drawn = {path: draws.setting(path, n) for path, n in changes}
         scene = Scene(*draws.accepted(draws.shipped()[base] | drawn, base))
         if scene.config.grid.size <= 5000:
-            self._foreseen(scene)
+            self._estimated(scene)
 
-    def _foreseen(self, scene: Scene, found: xr.Dataset | None = None) -> None:
+    def _estimated(self, scene: Scene, found: xr.Dataset | None = None) -> None:
         """It is the same when it is read again, and is predicted as it is run."""
         round_trip(scene.config, self.folder)
         invoke("run", str(self._written(draws.in_yaml(scene.flat))), "--dry-run")

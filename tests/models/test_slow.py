@@ -172,7 +172,7 @@ def test_a_mode_that_harmonics_of_the_other_drive_is_not_sure() -> None:
     assert not found.sure
 
 
-def test_a_start_by_angles_and_rates_is_foreseen() -> None:
+def test_a_start_by_angles_and_rates_is_estimated() -> None:
     """The same motion as by n0, x0 and y0 where the body spins about the vertical; and another one that is pushed."""
     start = {"roll": 0.01, "pitch": 0.002, "omega3": [-0.05, 0.05], "omega1": [0.0, 0.01]}
     found = sweep.run(LINE | {"start": start, "measure": ["reversals", "margin", "estimate"]})
@@ -196,7 +196,7 @@ def test_a_body_in_si_has_the_same_counts() -> None:
     np.testing.assert_array_equal(sweep.predict(asked).reversals_estimated.values, paper.reversals_estimated.values)
 
 
-def test_its_counts_are_called_foreseen() -> None:
+def test_its_counts_are_called_estimated() -> None:
     """They are not simulated; a run that measures both has simulated ones as well, and a formula's are predicted."""
     alone = sweep.run(LINE | {"model": "slow"})
     assert alone.reversals.attrs["long_name"] == alone.reversals_estimated.attrs["long_name"]
@@ -207,7 +207,7 @@ def test_its_counts_are_called_foreseen() -> None:
     assert quantities.field(both, "difference").attrs["long_name"] == "simulated − predicted"
 
 
-def test_counts_are_not_foreseen_for_critical_spins_alone() -> None:
+def test_counts_are_not_estimated_for_critical_spins_alone() -> None:
     config = sweep.load_config(LINE | {"model": "slow"})
     assert "reversals_estimated" not in predict(config.tier, config.grid).variables
     assert "reversals_estimated" in predict(config.tier, config.grid, config.measure).variables
@@ -300,7 +300,7 @@ def test_the_steps_are_vector_instructions() -> None:
     assert assembly.count("sqrtpd") > 11
 
 
-def test_the_model_draws_what_it_foresees_and_measures_counts_alone() -> None:
+def test_the_model_draws_what_it_estimates_and_measures_counts_alone() -> None:
     asked: dict[str, Any] = {"model": "slow", "friction": {"mu": 60}}
     assert sweep.load_config(asked | {"picture": ["estimate_certain"]}).picture == ("estimate_certain",)
     with pytest.raises(sweep.InputError, match=r"margin cannot be measured .*; choose from reversals$"):
