@@ -211,7 +211,7 @@ slower period."""
 def test_ripples_of_a_slow_mode_are_not_counted(method: str) -> None:
     cell = {"cases": {name: [value] for name, value in SLOW_RIPPLE.items()} | {"sigma": [2.57275e-6]}}
     found = sweep.run(cell, method=method)
-    assert (found.reversals.item(), found.decided.item()) == (1, 1)
+    assert (found.reversals.item(), found.certain.item()) == (1, 1)
 
 
 def test_a_count_of_the_wrong_parity_is_not_decided(monkeypatch: pytest.MonkeyPatch) -> None:
