@@ -20,6 +20,7 @@ import tempfile
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 
@@ -32,9 +33,21 @@ ORIGIN = {
 
 OTHERS = (
     "verified_*", "reversals_low", "reversals_high", "film_lean_?", "inferred", "raw_reversals", "t_first_reversal",
-    "reversal_time_reason", "lyapunov*", "cycle_*", "misfit", "reversal_times", "reversal",
+    "reversal_time_reason", "lyapunov*", "cycle_*", "misfit", "reversal_times", "reversal", "critical_reason", "sign",
+    "end", "doubts",
 )  # fmt: skip
 """Patterns of variables, and attributes of datasets, that only older or only newer revisions have."""
+
+RENAMED = {
+    "decided": "certain", "reversals_foreseen": "reversals_estimated", "foreseen_sure": "estimate_certain",
+    **{f"{name}_{side}{old}": f"{name}{new}[{value:+d}]"
+       for side, value in (("plus", 1), ("minus", -1))
+       for name, old, new in (("n_c1", "", ""), ("n_c2", "", ""), ("n_c1", "_linear", "_linear"))},
+}  # fmt: skip
+"""Old names of variables, and the new ones; "[+1]" is the part at that `sign`."""
+
+DOUBTS = {"sensitive": 2, "window_dependent": 4, "noise_limited": 32}
+"""Variables of older revisions that are bits of `doubts`."""
 
 WORDS = (
     "config", "config_hash", "coordinates", "measured", "pictured", "sweep_kind", "title", "units", "long_name",
@@ -49,19 +62,34 @@ def differences(one: Path, other: Path) -> Iterator[str]:
         before.set_auto_maskandscale(False)
         after.set_auto_maskandscale(False)
         yield from _attributes("", before, after)
-        yield from sorted(before.variables.keys() ^ after.variables.keys())
-        for name in sorted(before.variables.keys() & after.variables.keys()):
-            theirs, ours = before[name], after[name]
-            yield from _attributes(f"{name}:", theirs, ours)
-            if (theirs.dtype, theirs.dimensions, theirs.shape) != (ours.dtype, ours.dimensions, ours.shape):
+        theirs, ours = _parts(before), _parts(after)
+        if "sensitive" in theirs:
+            ours |= {name: (ours["doubts"] & bit != 0).astype("int8") for name, bit in DOUBTS.items() if name in theirs}
+        yield from sorted(theirs.keys() ^ ours.keys())
+        for name in sorted(theirs.keys() & ours.keys()):
+            if name in before.variables and name in after.variables:
+                yield from _attributes(f"{name}:", before[name], after[name])
+            first, second = theirs[name], ours[name]
+            if (first.dtype, first.shape) != (second.dtype, second.shape):
                 yield f"{name} (type or shape)"
-            elif differing := sum(one != other for one, other in zip(_bits(theirs), _bits(ours), strict=True)):
-                yield f"{name} ({differing} of {theirs.size} values)"
+            elif differing := sum(one != other for one, other in zip(_bits(first), _bits(second), strict=True)):
+                yield f"{name} ({differing} of {first.size} values)"
 
 
-def _bits(variable: netCDF4.Variable) -> list[bytes]:
-    values = variable[...].ravel()
-    return [value.encode() if variable.dtype is str else value.tobytes() for value in values]
+def _parts(dataset: netCDF4.Dataset) -> dict[str, Any]:
+    """Return the values of the variables by their new names; those over `sign` in a part for each."""
+    found = {}
+    for name, variable in dataset.variables.items():
+        values = variable[...]
+        if variable.dimensions[-1:] == ("sign",) and name != "sign":
+            found |= {f"{name}[{sign:+d}]": values[..., i] for i, sign in enumerate(dataset["sign"][:])}
+        else:
+            found[RENAMED.get(name, name)] = values
+    return found
+
+
+def _bits(values: Any) -> list[bytes]:
+    return [value.encode() if isinstance(value, str) else value.tobytes() for value in values.ravel()]
 
 
 def _attributes(place: str, before: netCDF4.Dataset, after: netCDF4.Dataset) -> Iterator[str]:

@@ -134,7 +134,7 @@ def plain_data(value: Any) -> Any:
 
 
 def _with_unit(plain: Any, unit: object) -> Any:
-    """Add a unit to the numbers of a value; "", "1" and "dimensionless" are none."""
+    """Add a unit to the numbers of a value; "", "1" and "dimensionless" add nothing."""
     if isinstance(plain, list):
         return [_with_unit(item, unit) for item in plain]
     return f"{plain!r} {unit}" if is_number(plain) and unit not in ("", "1", "dimensionless") else plain

@@ -49,7 +49,7 @@ _WINDOW = ("looks", "first_spin", "first_total", "mean_spin", "mean_total", "sum
 the first look and on average; the sum of the squares of the latter's deviations from its average, and that of the
 products."""
 
-FORESEEN = ("foreseen_at", "foreseen_spin", "foreseen_reversals", "foreseen_overshoot", "foreseen_nearest")
+PREDICTED = ("predicted_at", "predicted_spin", "predicted_reversals", "predicted_overshoot", "predicted_nearest")
 """One more than the step at which an ending was predicted, 0 if none was, and the ending (`final_spin.Ending`)."""
 
 
@@ -58,7 +58,7 @@ class Decay(Measurement):
     summary = "effect of the rattle on the spin after the run"
     asks = MODES
     needs = ("reversals",)
-    quantities = (NEXT, EVERY, WOUND, LEFT, *_WINDOW, *FORESEEN)
+    quantities = (NEXT, EVERY, WOUND, LEFT, *_WINDOW, *PREDICTED)
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {NEXT: float("inf")}

@@ -16,7 +16,7 @@ import numpy as np
 
 from sweep.jit import on_all_threads
 from sweep.kernels.layout import Table, constants_of
-from sweep.kernels.measures.decay import FORESEEN
+from sweep.kernels.measures.decay import PREDICTED
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
 from sweep.models.model import ENDING, MODES, Array, stack
@@ -61,15 +61,15 @@ def endings(table: Table, which: Array) -> Ending:
 
     If the table has a place for it, it keeps the prediction for a state.
     """
-    result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), FORESEEN[0] in table.layout
+    result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), PREDICTED[0] in table.layout
     model = table.layout.model
     if model is None or ENDING not in model.offers:
         return result
     new = which & np.isfinite(table.columns(model.states)).all(axis=1)
     if keeps:
-        kept = new & (table[FORESEEN[0]] == table["done"] + 1)
+        kept = new & (table[PREDICTED[0]] == table["done"] + 1)
         new &= ~kept
-        for whole, name in zip(result, FORESEEN[1:], strict=True):
+        for whole, name in zip(result, PREDICTED[1:], strict=True):
             whole[kept] = table[name][kept]
     cells = np.flatnonzero(new)
 
@@ -81,7 +81,7 @@ def endings(table: Table, which: Array) -> Ending:
 
     on_all_threads(find, range(0, len(cells), _AT_A_TIME))
     if keeps:
-        for name, values in zip(FORESEEN, (table["done"] + 1, *result), strict=True):
+        for name, values in zip(PREDICTED, (table["done"] + 1, *result), strict=True):
             table[name][cells] = values[cells]
     return result
 
