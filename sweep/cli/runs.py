@@ -220,7 +220,10 @@ def fit(
 
 
 def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr.Dataset:
-    """Follow the cells of `--at`."""
+    """Follow the cells of `--at`, which are checked before anything heavy is loaded."""
+    from sweep.config import values_at
+
+    values_at(config, at)
     from sweep.progress import Terminal
     from sweep.studies.trajectory import trajectory
 

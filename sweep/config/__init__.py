@@ -20,8 +20,8 @@ from sweep.config.distributions import chances, drawn
 from sweep.config.document import plain_data
 from sweep.config.messages import explain
 from sweep.config.schema import Integrator
-from sweep.config.values import Values, in_si
-from sweep.faults import Fault, InputError, fault_of, local_path
+from sweep.config.values import Values, in_si, values_of
+from sweep.faults import Fault, InputError, fault_of, local_path, refusal, suggestion
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.models.general.laws import LAWS
@@ -33,7 +33,7 @@ from sweep.models.variants import PAPER_LAW, Physics
 from sweep.parameters import PARAMETERS, Parameter, sections
 from sweep.units import SI, TIME
 
-__all__ = ["Config", "ConfigLike", "Fault", "InputError", "Integrator", "Values", "load_config"]
+__all__ = ["Config", "ConfigLike", "Fault", "InputError", "Integrator", "Values", "load_config", "values_at"]
 
 ConfigLike = Config | Mapping[str, Any] | str | os.PathLike[str]
 """A configuration, a mapping with the contents of its file, or the path of the file."""
@@ -230,6 +230,17 @@ def _parameters(
         elif name not in columns and default is not None:
             found[name] = Values.one(default)
     return found
+
+
+def values_at(config: Config, at: Mapping[str, Any]) -> dict[str, Values]:
+    """Return the values requested for each parameter; raise a `InputError` for the first that cannot be run."""
+    if not isinstance(at, Mapping):
+        raise fault_of(refusal(at, "values by parameter, such as {'mu': 60}"), "at")
+    model = config.tier
+    if unknown := next((name for name in at if name not in model.parameters), ""):
+        message = f"is not a parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
+        raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", "at", unknown)
+    return {name: values_of(config.table[name], value, config.unitless, "at") for name, value in at.items()}
 
 
 def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]) -> Integrator:

@@ -116,7 +116,7 @@ def first(source: Source) -> State:
     about = subject(source.dataset)
     show = about if about in source.variables else source.variables[0]
     dims = [str(d) for d in source.cell[show].dims]
-    dims += [d for d in source.axes if d not in dims][: max(0, 2 - len(dims))]
+    dims += [d for d in source.axes if d in source.dims and d not in dims][: max(0, 2 - len(dims))]
     longest = sorted(dims, key=lambda d: -len(source.axes[d].values))[:2]
     *y, x = [d for d in dims if d in longest]
     return State(x, y[0] if y else "", show, dict.fromkeys(source.axes, 0))

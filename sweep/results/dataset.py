@@ -101,7 +101,8 @@ VARIABLES: dict[str, Variable] = {
                      "Whether the number of reversals is final, with margins larger than ten times their errors; the "
                      "reasons against it are in doubts.", of_sound_runs=True),
     "doubts": _flag("reasons for doubt", {int(bit): name for bit, (name, _) in DOUBTS.items()},
-                    " ".join(f"{name}: {words}" for name, words in DOUBTS.values()), of_sound_runs=True, masks=True),
+                    "Bits by name: " + " ".join(f"{name}: {words}" for name, words in DOUBTS.values()),
+                    of_sound_runs=True, masks=True),
     "t_stop": Variable("float64", TIME, "time of the end", "Time at which the simulation ended."),
     "method": _flag("integration method", {each.code: name for name, each in METHODS.items()}),
     "step": Variable("float64", TIME, "integration step"),

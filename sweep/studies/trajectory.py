@@ -12,11 +12,10 @@ import numpy as np
 import xarray as xr
 
 from sweep import units as u
-from sweep.config import Config, ConfigLike, load_config
+from sweep.config import Config, ConfigLike, load_config, values_at
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.document import is_number, plain_data
 from sweep.config.schema import FOREVER
-from sweep.config.values import Values, values_of
 from sweep.engine import ending, executor
 from sweep.engine.cells import Cells
 from sweep.engine.errors import results
@@ -24,7 +23,7 @@ from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
 from sweep.engine.life import begin, live
 from sweep.engine.plan import plan, steps_of
 from sweep.engine.reporter import Count, Reporter
-from sweep.faults import duration, fault_of, refusal, suggestion
+from sweep.faults import duration, fault_of, refusal
 from sweep.grid import Array, Grid
 from sweep.interrupt import deferred
 from sweep.kernels import path
@@ -210,7 +209,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int
     other = {} if method and method.takes_every_step else {"method": PLAIN, "step": "auto"}
     config = replace(config, integrator=config.integrator.in_one_leg.model_copy(update=other))
     dataset.check_names(config, SERIES)
-    wanted = _values(config, {} if at is None else at)
+    wanted = values_at(config, {} if at is None else at)
     config = config if samples else config.at_medians
     left = {name: column for name, column in config.cases.items() if name not in wanted}
     parameters, drawn = config.parameters | wanted, config.samples if left else None
@@ -220,17 +219,6 @@ def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int
     if beyond := unfit(chosen) or misplaced(chosen):
         raise fault_of(beyond)
     return chosen
-
-
-def _values(config: Config, at: Mapping[str, Any]) -> dict[str, Values]:
-    """Return the values requested for each parameter; raise a `InputError` for the first that cannot be run."""
-    if not isinstance(at, Mapping):
-        raise fault_of(refusal(at, "values by parameter, such as {'mu': 60}"), "at")
-    model = config.tier
-    if unknown := next((name for name in at if name not in model.parameters), ""):
-        message = f"is not a parameter of the {model.name} model{suggestion(unknown, model.parameters)}"
-        raise fault_of(f"{message}; its parameters are {', '.join(model.parameters)}", "at", unknown)
-    return {name: values_of(config.table[name], value, config.unitless, "at") for name, value in at.items()}
 
 
 Marks = list[Array]

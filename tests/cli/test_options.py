@@ -22,10 +22,7 @@ EVERYWHERE = {
 ALONE = {
     "trajectory": {"output": "the function returns its dataset"},
     "fit": {"output": "the function returns its dataset"},
-    "plot": {
-        "figsize": "of a figure in a notebook", "ax": "axes of the caller",
-        "file": "", "dataset": "the FILE of the command",
-    },
+    "plot": {"ax": "axes of the caller", "file": "", "dataset": "the FILE of the command"},
     "explore": {
         "port": "of a server", "no_browser": "of a server", "model": "runs code", "height": "of a notebook",
         "file": "", "dataset": "the FILE of the command",

@@ -29,7 +29,7 @@ def test_cases(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
     dataset = sweep.run(
         write("cases: cells.csv\nintegrator: {method: dopri5, t_end: 1500}\n", "table.yaml"), tmp_path / "out"
     )
-    assert dict(dataset.sizes) == {"case": 2}
+    assert dict(dataset.sizes) == {"case": 2, "sign": 2}
     for i, (mu, b, n0) in enumerate(rows):
         one, other = dataset.isel(case=i), small.sel(mu=mu, b=b, n0=n0)
         for name in small.data_vars:

@@ -11,11 +11,12 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import click
 import numpy as np
 from click.testing import CliRunner
 
 from sweep.cli import main
-from sweep.cli.options import loaded
+from sweep.cli.options import _values, loaded
 from sweep.config import InputError, load_config
 from sweep.config.schema import PATHS
 from sweep.faults import FileError
@@ -107,11 +108,13 @@ def setting(random: Random, folder: Path) -> bool:
         given.append(text)
     file = folder / "base.yaml"
     names = (str(file), "--set", str(folder / "cells.csv"), "/etc/passwd")
-    config = _refused(lambda: loaded(file, tuple(given)), *names)
+    config = _refused(lambda: loaded(file, _values(None, SETTING, tuple(given))), *names)
     if config is not None:
         round_trip(config, folder)
     return config is not None
 
+
+SETTING = click.Option(["--set"])
 
 LEAVES = (
     None, True, 60, -1, 10**400, 1e13, 1e-400, float("nan"), 1j, b"x", "", "slip", "a/b", "\ud800", [], {}, (), [[1]],

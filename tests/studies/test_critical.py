@@ -207,7 +207,7 @@ def test_vectors_of_a_trajectory_are_along_the_same_axes_with_any_equations() ->
         sweep.trajectory(scene | {"body": body | more, "friction": {"mu": 3}}, t_end=20, every=0.5)
         for more in ({}, {"offset": 1e-300})
     )
-    assert float(general.contact_x[0, 0]) == pytest.approx(0.3)
+    assert float(general.contact_x[0]) == pytest.approx(0.3)
     turned = ("heading", "roll_angle", "pitch_angle", "table_x", "table_y")
     for name in ("spin", "contact_x", "contact_y", "slip_1", "slip_2", *turned):
         assert np.abs(papers[name]).max() > 1e-3

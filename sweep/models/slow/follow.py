@@ -280,10 +280,13 @@ def make_follow():
             g[_OLD + lane] = new
             h1, h2, cross = abs(g1), abs(g2), 2.0 * np.sqrt(square(g12) * f1 * f2)
             first, second = reverses & (h1 * f1 >= h2 * f2), reverses & (h1 * f1 < h2 * f2)
-            low = g[_LOW1 + lane] if first else g[_LOW2 + lane]
-            g[_SUNK + lane] = (1.0 if low < _DEEPEST else 0.0) if reverses else g[_SUNK + lane]
-            g[_LOG1 + lane], g[_LOW1 + lane] = 0.0 if first else g[_LOG1 + lane], 0.0 if first else g[_LOW1 + lane]
-            g[_LOG2 + lane], g[_LOW2 + lane] = 0.0 if second else g[_LOG2 + lane], 0.0 if second else g[_LOW2 + lane]
+            # Loads inside a conditional expression would keep the loop from being vectorised.
+            log1, log2, low1, low2 = g[_LOG1 + lane], g[_LOG2 + lane], g[_LOW1 + lane], g[_LOW2 + lane]
+            sunk, low = g[_SUNK + lane], low1 if first else low2
+            deep = 1.0 if low < _DEEPEST else 0.0
+            g[_SUNK + lane] = deep if reverses else sunk
+            g[_LOG1 + lane], g[_LOW1 + lane] = 0.0 if first else log1, 0.0 if first else low1
+            g[_LOG2 + lane], g[_LOW2 + lane] = 0.0 if second else log2, 0.0 if second else low2
             beating = cross / np.sqrt(square(both))
             lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
             over = (r1 < 0.0) & (r2 < 0.0) & (others + beating < _OVER * lasting)
@@ -312,10 +315,10 @@ def make_follow():
             e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
             n = (g[_N + lane] + step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-g[_D + lane] * step)
             steps = g[_STEPS + lane] + 1.0
-            g[_LOG1 + lane] += step * rate1.real
-            g[_LOG2 + lane] += step * rate2.real
-            g[_LOW1 + lane] = min(g[_LOW1 + lane], g[_LOG1 + lane])
-            g[_LOW2 + lane] = min(g[_LOW2 + lane], g[_LOG2 + lane])
+            log1, log2 = g[_LOG1 + lane] + step * rate1.real, g[_LOG2 + lane] + step * rate2.real
+            low1, low2 = g[_LOW1 + lane], g[_LOW2 + lane]
+            g[_LOG1 + lane], g[_LOW1 + lane] = log1, log1 if log1 < low1 else low1
+            g[_LOG2 + lane], g[_LOW2 + lane] = log2, log2 if log2 < low2 else low2
             fails = (not abs(n) < _FAR) | (steps >= _MOST_STEPS)
             g[_STATE + lane] = _FAILED if (state == _RUNNING) & fails else state
             g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n, steps
