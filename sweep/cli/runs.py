@@ -84,6 +84,9 @@ def trajectory(
     point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for
     samples, only the spins are drawn.
     """
+    from sweep.config import values_at
+
+    values_at(config, at)  # before anything heavy is loaded
     from sweep.studies.trajectory import estimate
 
     if dry_run:
@@ -220,10 +223,7 @@ def fit(
 
 
 def _followed(config: Config, at: dict[str, Any], quiet: bool, **how: Any) -> xr.Dataset:
-    """Follow the cells of `--at`, which are checked before anything heavy is loaded."""
-    from sweep.config import values_at
-
-    values_at(config, at)
+    """Follow the cells of `--at`."""
     from sweep.progress import Terminal
     from sweep.studies.trajectory import trajectory
 
