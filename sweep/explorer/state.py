@@ -96,12 +96,17 @@ class Choice:
         return replace(state, **change)
 
 
+_CHOSEN = "sign"
+"""An axis along which no map is drawn: the visitor chooses the sign of a critical spin."""
+
+
 def choices(source: Source) -> dict[str, Choice]:
     """All choices for the map of a dataset, by name."""
-    axes = list(source.axes), [source.words(d) for d in source.axes]
+    drawn = [d for d in source.axes if d != _CHOSEN]
+    axes = drawn, [*map(source.words, drawn)]
     found = [Choice("show", "variable", source.variables, [*map(source.words, source.variables)])]
     found.append(Choice("x", "horizontal axis", *axes))
-    if len(source.axes) > 1:
+    if len(drawn) > 1:
         found.append(Choice("y", "vertical axis", *axes))
     for name, axis in source.axes.items():
         unit = labels.si_unit(source.dataset, name)
@@ -115,8 +120,8 @@ def first(source: Source) -> State:
     """The state for an address without a query: the dataset's subject over its two longest axes, as in a picture."""
     about = subject(source.dataset)
     show = about if about in source.variables else source.variables[0]
-    dims = [str(d) for d in source.cell[show].dims]
-    dims += [d for d in source.axes if d in source.dims and d not in dims][: max(0, 2 - len(dims))]
+    dims = [str(d) for d in source.cell[show].dims if d != _CHOSEN]
+    dims += [d for d in source.axes if d not in (*dims, _CHOSEN)][: max(0, 2 - len(dims))]
     longest = sorted(dims, key=lambda d: -len(source.axes[d].values))[:2]
     *y, x = [d for d in dims if d in longest]
     return State(x, y[0] if y else "", show, dict.fromkeys(source.axes, 0))
