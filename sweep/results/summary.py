@@ -95,7 +95,7 @@ def _fit(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def verdict(dataset: xr.Dataset) -> list[str]:
-    """Return the sentences on a fit, one per line; none for a fit of an earlier version."""
+    """Return the sentences on a fit, one per line."""
     return str(dataset.attrs.get("verdict", "")).splitlines()
 
 
@@ -188,9 +188,6 @@ _REMEDIES = {
 def _doubts(dataset: xr.Dataset, counts: int) -> Iterator[str]:
     """Say how many of the counts are certain, where the others lie and what to do, and which errors are large."""
     left, doubts = uncertain(dataset), dataset["doubts"]
-    if missed := int((doubts & int(Doubt.TOLERANCE) > 0).sum()):
-        error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
-        yield f"{missed} of {counted(counts, 'cell')} {'misses' if missed == 1 else 'miss'} the tolerance{error}"
     if "certain" in dataset:
         others = "; the others:" if left.any() else ""
         yield f"{counts - int(left.sum())} of {counted(counts, 'count is', 'counts are')} certain{others}"
@@ -201,6 +198,9 @@ def _doubts(dataset: xr.Dataset, counts: int) -> Iterator[str]:
         left &= ~these
         if these.any():
             yield f"  {int(these.sum())} {words}{_place(these)}: {remedy}"
+    if missed := int((doubts & int(Doubt.TOLERANCE) > 0).sum()):
+        error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
+        yield f"{missed} of {counted(counts, 'cell')} {'misses' if missed == 1 else 'miss'} the tolerance{error}"
     if noisy := int((doubts & int(Doubt.ROUND_OFF) > 0).sum()):
         yield f"in {counted(noisy, 'cell')} round-off decides when late reversals come: spin errors are unknown there"
 

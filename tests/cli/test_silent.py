@@ -105,10 +105,10 @@ def test_the_last_lines_of_a_run_say_which_counts_are_certain_and_what_to_do_abo
     assert summary(**rules, **counts, **errors).splitlines() == [
         "4 cells (mu 4): 3 settled, 1 time_limit; 1 to 5 reversals, "
         "as predicted in 50.0% of the cells, within one in 75.0%",
-        "2 of 4 cells miss the tolerance: spin errors up to 2.0e-03",
         "2 of 4 counts are certain; the others:",
         "  1 not settled at the time limit, at mu = 30: raise t_end",
         "  1 different with a longer step, at mu = 20: lower the tolerance",
+        "2 of 4 cells miss the tolerance: spin errors up to 2.0e-03",
         "spin error: median 1.0e-09, largest 2.0e-03, as estimated",
         "step: 1 to 4, set by accuracy in 1 cell, repeat in 1 cell",
     ]
