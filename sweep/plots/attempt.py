@@ -7,15 +7,23 @@ from pathlib import Path
 
 import xarray as xr
 
-from sweep.faults import Error, brief
+from sweep.faults import Error, FileError, brief
 
 
 def attempt(result: xr.Dataset, path: Path, note: Callable[[str], None], variable: str | None = None) -> None:
-    """Draw a dataset, or one of its variables, into a file; if that fails for any reason, say so in a note."""
+    """Draw a dataset, or one of its variables, into a file; if it cannot be drawn, say so in a note.
+
+    Raises
+    ------
+    FileError
+        if the file cannot be written, as on a full disk.
+    """
     try:
         from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
 
         picture.plot(result, variable, output=path)
+    except FileError:
+        raise
     except Exception as error:
         words = str(error) if isinstance(error, Error) else brief(f"{type(error).__name__}: {error}")
         note(f"no picture{f' of {variable}' if variable else ''}: {words}")

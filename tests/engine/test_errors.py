@@ -191,6 +191,8 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
     difference = np.abs(measured(kernel, images, times)["spin_final"] - found["spin_final"][sound])
     ratio = difference / found["spin_error"][sound]
     assert sound.mean() > 0.9
+    assert np.isfinite(ratio).mean() > 0.9  # unknown where round-off decides
+    ratio = ratio[np.isfinite(ratio)]
     assert 0.3 < np.median(ratio) < np.quantile(ratio, 0.9) < 3
     assert (ratio > 10).mean() <= 1 / 40
 
