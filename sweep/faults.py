@@ -140,7 +140,7 @@ def local_path(path: object, argument: str = "output", wanted: str = "the path o
 
 
 class CompileError(RuntimeError):
-    """Code that becomes part of a kernel does not compile; the message names the place in the fewest lines.
+    """Code that becomes part of a kernel does not compile; the message names the place in two lines.
 
     Attributes
     ----------

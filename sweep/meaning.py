@@ -68,7 +68,7 @@ def _of(value: Any, seen: dict[int, int]) -> Iterator[str]:
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic)
 
 _LIBRARIES = ("numpy", "numba", "builtins", "math", "cmath")
-"""Packages whose objects are known by name: hashes of versions are for those who ask."""
+"""Packages whose objects are known by name; who caches compiled code adds their versions to the key."""
 
 
 def _is_of_library(function: FunctionType) -> bool:

@@ -23,7 +23,7 @@ _POOLS = {"tbb": "numba.np.ufunc.tbbpool", "omp": "numba.np.ufunc.omppool"}
 
 
 def check() -> None:
-    """Raise a `InputError` for the first variable whose value Numba does not accept."""
+    """Raise an `InputError` for the first variable whose value Numba does not accept."""
     for name, (pattern, wanted) in _ALLOWED.items():
         if (given := os.environ.get(name, "").strip()) and not re.fullmatch(pattern, given):
             refuse(name, refusal(given, wanted))

@@ -28,7 +28,7 @@ def say(text: str, *, err: bool = False) -> None:
 
 
 def refuse(option: str | Path, message: str) -> NoReturn:
-    """Raise a `InputError` about an option or a file."""
+    """Raise an `InputError` about an option or a file."""
     raise fault_of(message, file=str(option))
 
 

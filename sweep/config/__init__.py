@@ -233,7 +233,7 @@ def _parameters(
 
 
 def values_at(config: Config, at: Mapping[str, Any]) -> dict[str, Values]:
-    """Return the values requested for each parameter; raise a `InputError` for the first that cannot be run."""
+    """Return the values requested for each parameter; raise an `InputError` for the first that cannot be run."""
     if not isinstance(at, Mapping):
         raise fault_of(refusal(at, "values by parameter, such as {'mu': 60}"), "at")
     model = config.tier

@@ -141,7 +141,7 @@ def _with_unit(plain: Any, unit: object) -> Any:
 
 
 def read(path: FilePath) -> Document:
-    """Read a YAML file; raise a `InputError` that says what is wrong with it and where."""
+    """Read a YAML file; raise an `InputError` that says what is wrong with it and where."""
     text = text_of(path)
     node = _compose(text, str(path))
     if not isinstance(node, MappingNode):

@@ -119,7 +119,7 @@ def named(text: str) -> tuple[str, str]:
 
 
 def _lines(file: str, text: str) -> tuple[str, Lines]:
-    """Split the non-empty lines into cells, and find their separator; raise a `InputError` if there are none."""
+    """Split the non-empty lines into cells, and find their separator; raise an `InputError` if there are none."""
     text = _without_title(re.sub("\r\n?", "\n", text))
     try:
         separator = _separator(text)
@@ -142,7 +142,7 @@ def _without_title(text: str) -> str:
 
 
 def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separator: str) -> None:
-    """Raise a `InputError` if a row has a different number of cells from the header."""
+    """Raise an `InputError` if a row has a different number of cells from the header."""
     top, columns = header[0], len(header[1])
     if not (ragged := [(line, len(row)) for line, row in rows if len(row) != columns]):
         return
@@ -156,7 +156,7 @@ def _require_even(file: str, header: tuple[int, list[str]], rows: Lines, separat
 
 
 def _united(file: str, names: list[str], over: tuple[int, list[str]], under: tuple[int, list[str]]) -> list[str]:
-    """Return the units in the header (`over`) and in the row below it; raise a `InputError` where they differ."""
+    """Return the units in the header (`over`) and in the row below it; raise an `InputError` where they differ."""
     (top, units), (line, below) = over, under
     for column, (unit, own) in enumerate(zip(units, below, strict=True)):
         if unit and own and unit != own:

@@ -58,7 +58,7 @@ def named(source: Document, announce: Callable[[str], None] | None) -> Origin | 
 
 
 def try_out(config: Config) -> None:
-    """Call the functions of a user's model for the first and the last cell; raise a `InputError` if they do not
+    """Call the functions of a user's model for the first and the last cell; raise an `InputError` if they do not
     work."""
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}

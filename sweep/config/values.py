@@ -105,7 +105,7 @@ def _parse(parameter: Parameter, raw: Any) -> Values:
 
 
 def values_of(parameter: Parameter, raw: Any, unitless: Callable[[str, str], str], argument: str) -> Values:
-    """Return the number or the axis that an argument gives to a parameter; a `InputError` names both.
+    """Return the number or the axis that an argument gives to a parameter; an `InputError` names both.
 
     `unitless`, such as `Config.unitless`, says why the parameter cannot have a unit.
     """

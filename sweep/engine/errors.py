@@ -116,7 +116,7 @@ def accompany(lives: Lives, rows: Array) -> None:
     """Start the companions of the cells `rows`, setting their own runs aside."""
     run = lives.take(rows)
     lives.aside[rows] = run.images
-    lives.enter(rows, COMPANION, companions(run), settles=limited_by_noise(run) & run.rules.settles)
+    lives.enter(rows, COMPANION, companions(run), settles=_ends_by_itself(run))
 
 
 def after_companion(lives: Lives, rows: Array) -> Array:
@@ -139,7 +139,7 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     hopeless = (shorter > SHORTEST) | (errors.spin > most)
     hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
     long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
-    known = ~limited_by_noise(now)
+    known = ~limited_by_round_off(now)
     again = (large | by_chance) & known & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
     if not rules.fixed:
         missed = rows[~again & (errors.reported > limit) & known]
@@ -163,9 +163,14 @@ def allowed(part: Cells) -> Array:
     return np.asarray(max(part.rules.tolerance, ROUND_OFF) * longer * unit)
 
 
-def limited_by_noise(part: Cells) -> Array:
+def limited_by_round_off(part: Cells) -> Array:
     """Return in which cells a reversal grew from round-off, shape (cells,)."""
     return np.asarray(part.recorded(RoundOff.name) > 0)
+
+
+def _ends_by_itself(part: Cells) -> Array:
+    """Return whose companions run to their own ends, because round-off decides when the cells end, shape (cells,)."""
+    return limited_by_round_off(part) & part.rules.settles
 
 
 def imbalance(part: Cells) -> Array:
@@ -183,9 +188,9 @@ def imbalance(part: Cells) -> Array:
 def companions(part: Cells) -> Array:
     """Return state rows at t = 0 of the companions of cells, none of which has failed.
 
-    They run as long as the cells, or if round-off decides when these end, to their own ends.
+    They run as long as the cells, or to their own ends.
     """
-    until = np.where(limited_by_noise(part) & part.rules.settles, part.rules.t_end, part.times)
+    until = np.where(_ends_by_itself(part), part.rules.t_end, part.times)
     return part.start(part.kernel.table(part.images)["step"] * _ratio(part), until)
 
 
@@ -231,7 +236,7 @@ def _of_counts(part: Cells, companion: Cells, larger: Array, failed: Array) -> A
     predicted = ends_as_predicted(table) & ~failed
     ours, theirs = last_arc(table, predicted), last_arc(other, predicted)
     # Round-off does not shrink with the step.
-    larger = np.where(limited_by_noise(part), np.fmin(larger, 1.0), larger)
+    larger = np.where(limited_by_round_off(part), np.fmin(larger, 1.0), larger)
     margins = [np.abs(one - another) / larger for one, another in zip(ours[1:], theirs[1:], strict=True)]
     return np.where(failed, np.nan, [theirs.reversals, *margins])
 

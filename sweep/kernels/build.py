@@ -110,7 +110,7 @@ def compile_seconds(jobs: Sequence[Job]) -> float:
 
 
 def try_compiling(model: Model) -> None:
-    """Compile the inline functions of a model one by one, so that a `InputError` gives the line of a fault."""
+    """Compile the inline functions of a model one by one, so that an `InputError` gives the line of a fault."""
     numba, states = load_numba(), (0.0,) * len(model.states)
     constants = model.constants(*(0.0 for _ in model.constants._fields))
     with blamed(model.origin):

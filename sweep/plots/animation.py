@@ -98,13 +98,13 @@ def is_dataset(source: object) -> TypeGuard[xr.Dataset | str | Path]:
 
 
 def require_attitude(config: Config) -> None:
-    """Raise a `InputError` if the bodies of a simulated model have no attitude that could be shown."""
+    """Raise an `InputError` if the bodies of a simulated model have no attitude that could be shown."""
     if config.simulated and not config.equations.path:
         raise config.error(("model",), f"the bodies of {config.model} have no attitude; animate slip or noslip")
 
 
 def check(output: str | Path | None, begin: float, end: float | None, speed: float | None) -> None:
-    """Raise a `InputError` if there is no such interval or speed, or no animation in a file of this name."""
+    """Raise an `InputError` if there is no such interval or speed, or no animation in a file of this name."""
     if not (is_number(plain_data(begin)) and isfinite(begin)):
         raise fault_of(refusal(begin, "a finite number"), "begin")
     if end is not None and not (is_number(plain_data(end)) and begin < end < inf):

@@ -136,7 +136,7 @@ def nearest(dataset: xr.Dataset, at: Mapping[str, Any]) -> dict[str, int]:
 
 
 def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
-    """Raise a `InputError` if a variable cannot be drawn over these dimensions."""
+    """Raise an `InputError` if a variable cannot be drawn over these dimensions."""
     if name == "probability" and "count" not in dataset.coords:
         raise fault_of("the probabilities have lost their axis count; reduce the dataset along other axes", "variable")
     if odd := odd_axis(dataset, dims):

@@ -195,7 +195,7 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
 
 
 def _require_scale(chosen: panels.Panels, limits: Limits, cmap: str | None) -> None:
-    """Raise a `InputError` for limits or a colour map that the chosen panels have no scale for."""
+    """Raise an `InputError` for limits or a colour map that the chosen panels have no scale for."""
     name = chosen.names[0]
     if limits != scales.AUTO and labels.flag_words(chosen.dataset, name):
         option = "vmax" if limits[0] is None else "vmin"

@@ -102,7 +102,7 @@ def pictured(dataset: xr.Dataset) -> list[str]:
 
 
 def check_pictures(config: Config) -> None:
-    """Raise a `InputError` if a configuration names a picture of a variable that its run does not have."""
+    """Raise an `InputError` if a configuration names a picture of a variable that its run does not have."""
     comes_with = {variable: name for name, kind in MEASURES.items() for variable in kind.variables}
     if config.tier.counts in Estimate.variables:  # the reversals of this tier are estimated
         comes_with |= dict.fromkeys(Estimate.variables, Reversals.name)

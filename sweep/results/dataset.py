@@ -204,7 +204,7 @@ def uncertain(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
-    """Raise a `InputError` if a parameter has the name of a variable or dimension, or of one of these `series`."""
+    """Raise an `InputError` if a parameter has the name of a variable or dimension, or of one of these `series`."""
     own = {*VARIABLES, *PROBABILITIES, *ROWS, *FURTHER, *series}
     names = own & set(config.tier.parameters)
     if names:

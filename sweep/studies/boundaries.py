@@ -34,6 +34,7 @@ from sweep.results.margins import POINTS, Counts
 from sweep.results.store import Store
 from sweep.studies import DEVIATIONS, WIDTHS
 from sweep.studies.curve import Cell, Curve, Middle, Point
+from sweep.studies.roots import CLOSER
 from sweep.studies.study import Search, Task, measuring, require_between, require_certain
 
 # Largest rounding error of a whole index along an edge of the grid. `_levelled` keeps points on diagonals farther away.
@@ -44,9 +45,6 @@ _A_POINT = 8
 
 _PLACES = 201
 """Least number of places along the axis at which the count is estimated."""
-
-_CLOSER = 5
-"""Times that a bracket with uncertain cells is narrowed from outside, each time halving the way to the nearest one."""
 
 Asked = tuple[Curve, Point | Middle, float]
 """A requested cell: the part and curve that it belongs to, and its place along the line."""
@@ -257,7 +255,7 @@ class Along(Boundaries):
         """Narrow all brackets, and those with uncertain cells from outside."""
         self.tolerance = self.sharp(self.width)
         yield from iter(self._wanted, [])
-        for _ in range(_CLOSER):
+        for _ in range(CLOSER):
             yield [(curve, point, place) for curve in self.curves for point in curve.points
                    for place in point.root.closer()]  # fmt: skip
             yield from iter(self._wanted, [])

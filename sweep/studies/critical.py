@@ -23,14 +23,11 @@ from sweep.results.dataset import Reason
 from sweep.results.margins import Counts
 from sweep.results.store import Store
 from sweep.studies import WIDTHS
-from sweep.studies.roots import Root
+from sweep.studies.roots import CLOSER, Root
 from sweep.studies.study import Search, Task, measuring, require_between, require_certain
 
 RATIO = 1.25
 """Ratio of successive spins in the outward search."""
-
-# Times that a bracket with uncertain counts is narrowed from outside, each time halving the way to the nearest one.
-_CLOSER = 5
 
 # Number of spins simulated at once in the outward search.
 _OUTWARDS = 5
@@ -52,7 +49,7 @@ def critical(config: Config, width: float) -> Task:
 
 
 def searchable(config: Config) -> Config:
-    """Return `config` with a single start spin, which has no influence; raise a `InputError` if it is unsuitable."""
+    """Return `config` with a single start spin, which has no influence; raise an `InputError` if it is unsuitable."""
     require_certain(config)
     if not config.of_rattlebacks:
         raise config.error(("model",), "not a rattleback; choose the model slip or noslip")
@@ -97,7 +94,7 @@ class Spin:
     """The bracket, once the outward search has found one."""
     checked: dict[float, bool] = field(default_factory=dict)
     """Places simulated with estimated errors, and whether they count as the bracket says, with certainty."""
-    closer: int = _CLOSER
+    closer: int = CLOSER
     """Times that the bracket may still be narrowed from outside."""
     reason: int | None = None
     """The result; None while the search goes on."""

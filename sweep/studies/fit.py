@@ -108,7 +108,7 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared
 
 
 def _check_length(problem: Problem) -> None:
-    """Raise a `InputError` if a fit would take hours, as it does for a film whose unit is wrong."""
+    """Raise an `InputError` if a fit would take hours, as it does for a film whose unit is wrong."""
     film, places = problem.film, qmc.Sobol(len(problem.free), rng=0).random(64)
     usual = float(np.median(film.time[-1] / problem.steps(places)))
     if usual > _MOST_STEPS:
@@ -132,7 +132,7 @@ def _countable(film: Film) -> Array:
 
 
 def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> Config:
-    """Return `config` if it describes one body, apart from the `free` parameters; raise a `InputError` otherwise.
+    """Return `config` if it describes one body, apart from the `free` parameters; raise an `InputError` otherwise.
 
     `of_film` holds the names of the free parameters of the film itself.
     """

@@ -94,7 +94,7 @@ def of_film(film: Film) -> dict[str, Range]:
 
 
 def of_parameter(config: Config, film: Film, name: str) -> Range:
-    """Return the range of a parameter of `config`; raise a `InputError` if nothing defines it."""
+    """Return the range of a parameter of `config`; raise an `InputError` if nothing defines it."""
     values, parameter = config.parameters[name], config.table[name]
     least, most = max(parameter.above, parameter.at_least), parameter.below
     if values.is_axis and len(values.numbers) > 1:

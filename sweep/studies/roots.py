@@ -26,6 +26,9 @@ _ALONE = 3
 # Number of equal parts into which a bracket is divided where the values give no better proposal.
 _PARTS = 4
 
+CLOSER = 5
+"""Times that a bracket with uncertain cells is narrowed from outside, each time halving the way to the nearest one."""
+
 # Uncertainty of the first proposal, from the two ends alone, relative to their distance.
 _FIRST = 0.05
 

@@ -59,20 +59,20 @@ def measuring(config: Config) -> Config:
 
 
 def require_certain(config: Config) -> None:
-    """Raise a `InputError` if the model is not simulated, or a parameter is a distribution."""
+    """Raise an `InputError` if the model is not simulated, or a parameter is a distribution."""
     require_simulated(config)
     for name in config.distributions:
         raise config.error(name, "is a distribution, which only run can sample; give a number or an axis here")
 
 
 def require_simulated(config: Config) -> None:
-    """Raise a `InputError` if the model is not simulated."""
+    """Raise an `InputError` if the model is not simulated."""
     if not config.simulated:
         raise config.error(("model",), f"the {config.model} model is not simulated; choose {either(MODELS)}")
 
 
 def require_between(option: str, value: float, ends: tuple[float, float]) -> None:
-    """Raise a `InputError` if the value of an option is not between these."""
+    """Raise an `InputError` if the value of an option is not between these."""
     if not (is_number(plain_data(value)) and ends[0] <= value <= ends[1]):
         raise fault_of(f"must be between {ends[0]:g} and {ends[1]:g}, not {quote(value)}", option)
 

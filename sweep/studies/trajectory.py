@@ -198,7 +198,7 @@ def estimate(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: i
 
 
 def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int | None = None) -> Config:
-    """Return `config` with the cells selected by `at`, and dopri5; raise a `InputError` if they cannot run.
+    """Return `config` with the cells selected by `at`, and dopri5; raise an `InputError` if they cannot run.
 
     Uncertain parameters that `at` does not name take their median, or else each of the `samples`.
     """

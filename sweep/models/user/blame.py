@@ -14,7 +14,7 @@ from sweep.models.origin import Origin
 
 @contextmanager
 def blamed(origin: Origin | None, *, always: bool = False) -> Iterator[None]:
-    """Turn errors raised by the code of a user's model, or all errors, into a `InputError` that gives the place."""
+    """Turn errors raised by the code of a user's model, or all errors, into an `InputError` that gives the place."""
     try:
         yield
     except InputError:

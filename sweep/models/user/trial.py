@@ -29,7 +29,7 @@ Faults = Iterator[tuple[Any, str]]
 
 
 def check(made, origin: Origin) -> None:
-    """Raise a `InputError` for the first fault of the MODEL that a file defines."""
+    """Raise an `InputError` for the first fault of the MODEL that a file defines."""
     _refuse(_declared(made), origin)
 
 
