@@ -53,8 +53,8 @@ REASONS = {int(reason): reason.name.lower() for reason in Reason}
 
 DOUBTS = {
     Doubt.TIME_LIMIT: ("not_final", "the time limit came first, so more reversals may follow."),
-    Doubt.STEP: ("depends_on_step", "with longer steps the number of reversals is another one."),
-    Doubt.WINDOWS: ("depends_on_windows", "with averages over other windows the number of reversals is another one."),
+    Doubt.STEP: ("depends_on_step", "longer steps give a different number of reversals."),
+    Doubt.WINDOWS: ("depends_on_windows", "averages over other windows give a different number of reversals."),
     Doubt.PARITY: ("contradicts_spin", "the sign of the final spin does not match the number of reversals."),
     Doubt.MARGIN: ("close_to_another", "a margin is smaller than ten times its error, so another count is possible."),
     Doubt.ROUND_OFF: (
