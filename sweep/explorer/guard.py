@@ -1,6 +1,7 @@
 """Refuse requests that pages of other sites make to the explorer.
 
-A browser lets any page send requests to this machine, and a page whose own name leads to this machine could read the answers.
+A browser lets any page send requests to this machine, and a page whose own name leads to this machine could read the
+answers.
 """
 
 from __future__ import annotations
