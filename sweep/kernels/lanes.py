@@ -143,7 +143,7 @@ def make_look(model: Model, layout: Layout, may_settle, shown, measure, energy_g
             ends = SETTLED if settled & stops else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
-                # A rattle that can only decay needs no leap: it settles.  No leap begins while a measurement has
+                # A rattle that can only decay needs no skip: it settles.  No skip begins while a measurement has
                 # yet to follow the spin, or a reversal just before it would not be counted.
                 ends = QUIET if small & followed & (not ((bounded | settled) & stops)) else ends
             ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends

@@ -111,7 +111,7 @@ def trajectory(
     """Follow cells of `config`, as `sweep.trajectory`.
 
     The method is always dopri5, whatever the configuration names.  A sample is a state between two steps, but adams can
-    continue only from the end of a block of steps, and leaps over stretches of small rattle.
+    continue only from the end of a block of steps, and skips intervals of small rattle.
 
     Parameters
     ----------

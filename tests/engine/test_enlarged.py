@@ -117,7 +117,7 @@ def test_the_time_limit_leaves_no_trace(write: Write, t_end: int) -> None:
 
 
 def test_what_adams_foresaw_is_not_taken_over(write: Write) -> None:
-    """Near the limit it takes short steps where it would have leapt on to a later one."""
+    """Near the limit it takes short steps where it would have skipped to a later one."""
     text = by("adams", MORE)
     short, later = sweep.run(write(text)), sweep.load_config(write(text.replace("3000", "6000")))
     assert (taken_over(later, short).cells >= 0).sum() > 5

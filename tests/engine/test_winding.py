@@ -28,7 +28,7 @@ def test_a_pause_between_blocks_changes_no_bit() -> None:
         executor.execute(kernel, paused.images)
     kernel.table(part.images)["goal"] = table["goal"]
     executor.execute(kernel, part.images)
-    # When to look for a leap depends on how many steps are left.
+    # When to look for a skip depends on how many steps are left.
     same = [name for name in kernel.layout.names if name != "quiet_after"]
     np.testing.assert_array_equal(table.columns(same), kernel.table(part.images).columns(same))
 

@@ -1,4 +1,4 @@
-"""Late reversals, which round-off makes come too early: lifted by adams, and said of a cell where it does."""
+"""Late reversals, which round-off makes come too early: rescaled by adams, and said of a cell where it does."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from support.kernels import PAPER_FORM, images, kernel, run
 from support.physics import turned_inertia
 
 import sweep
-from sweep.kernels.adams import stretches
+from sweep.kernels.adams import skips
 from sweep.kernels.measures import noise
 from sweep.kernels.methods import automatic_step
 from sweep.kernels.status import QUIET, RUNNING, Doubt
@@ -75,12 +75,12 @@ def test_a_mode_that_sank_is_flagged_only_once_it_has_grown_back() -> None:
 
 def test_a_mode_let_down_too_late_is_flagged() -> None:
     table = images(ADAMS, 0.05, 9000.0, n0=[0.05, 0.01])
-    table[:, [ADAMS.layout.index(name) for name in stretches.LIFTS]] = 12.0
+    table[:, [ADAMS.layout.index(name) for name in skips.SCALES]] = 12.0
     ADAMS.table(table)["status"] = QUIET
     ADAMS.carry(table)
     assert (ADAMS.table(table)["status"] == RUNNING).all()
     assert list(ADAMS.table(table)["round_off"]) == [0, 1]
-    assert list(ADAMS.table(table)["lift0"]) == [12, 0]
+    assert list(ADAMS.table(table)["scale0"]) == [12, 0]
 
 
 def test_growth_is_that_of_the_model() -> None:

@@ -124,7 +124,7 @@ def test_no_function_takes_the_states_of_another_model() -> None:
 
 
 def test_fast_spin_has_a_mode_of_negative_energy() -> None:
-    """Friction makes that one grow, at the cost of the spin, and the body rises; no leap may use it."""
+    """Friction makes that one grow, at the cost of the spin, and the body rises; no skip may use it."""
     body = columns(a=[1.05, 1.05], b=1.04, mu=5000.0)
     form = form_of(slip.MODEL)
     rates, _, sound = slow_rates(form, form.model.constants.of(body), np.array([0.05, 5.0]))

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import Cached, compiled, full_width, inline, nothing
-from sweep.kernels.adams import start_up, stretches, weights
+from sweep.kernels.adams import skips, start_up, weights
 from sweep.kernels.adams.start_up import count_levels, duration
 from sweep.kernels.adams.step import (
     BDF_GAMMA,
@@ -56,7 +56,7 @@ class Adams(Stepper):
     """The stepper of this method; its states contain M in place of ω.
 
     Where the rattle is so small that its linear modes describe it to within `tolerance` in spin, these
-    carry the trajectory on, without steps (`sweep.kernels.adams.stretches`), if they are known (`MODES`).
+    give the further course of the trajectory, without steps (`sweep.kernels.adams.skips`), if they are known (`MODES`).
     """
 
     method = "adams"
@@ -71,8 +71,8 @@ class Adams(Stepper):
 
     def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
         """Quantities for looks at small rattle, for the weights and the matrix P, and for the history."""
-        looks = ("quiet_energy", "quiet_after", "bending", *stretches.LIFTS) if MODES in self.model.offers else ()
-        powers = stretches.POWERS if WORK in follows else ()
+        looks = ("quiet_energy", "quiet_after", "bending", *skips.SCALES) if MODES in self.model.offers else ()
+        powers = skips.POWERS if WORK in follows else ()
         return (*looks, "begin", "spin", *powers, "gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX, *_HISTORY)
 
     def images(
@@ -125,7 +125,7 @@ class Adams(Stepper):
         table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
         table["begin"], table["status"] = ended["ticks"] * ended["spacing"], ended["status"]
         if WORK in kernel.follows:
-            table.set_columns(stretches.POWERS, history[:, :-4:-1, -1])
+            table.set_columns(skips.POWERS, history[:, :-4:-1, -1])
         spin, rattle, inertia = self.model.energy(*kernel.unpack(table.images))
         energy = rattle + 0.5 * inertia * spin**2
         grown = energy > table["energy_start"] * (1 + self.energy_gain)
@@ -137,17 +137,17 @@ class Adams(Stepper):
             each.skip(table, stretch)
 
     def _set_looks(self, table: Table, columns: Columns) -> None:
-        """Set the energy below which, and the step after which, looks search for a stretch of small rattle."""
+        """Set the energy below which, and the step after which, looks search for something to skip."""
         reach, goal = linear.fastest_spin(self.model, columns), table["goal"]
         tolerance = self.tolerance / self.form.time_unit(columns)
-        table["quiet_energy"] = stretches.quiet_energy(reach)
+        table["quiet_energy"] = skips.quiet_energy(reach)
         time = goal * table["step"]
-        table["quiet_after"] = stretches.first_look(self.model, columns, reach, time, goal, tolerance)
+        table["quiet_after"] = skips.first_look(self.model, columns, reach, time, goal, tolerance)
         table["bending"] = bending(self.model, columns)
 
     def carry(self, kernel: Kernel, images: Array) -> None:
         """As `Kernel.carry`."""
-        stretches.carry(self.form, kernel, images, self.tolerance)
+        skips.skip(self.form, kernel, images, self.tolerance)
 
     def make_run_block(self, kernel: Kernel):
         """Compiled (group, packs) -> None: takes `BLOCK` steps of all lanes.
@@ -201,7 +201,7 @@ def _make_work(kernel: Kernel):
     """Inline (group, lane, h, power) -> the work of friction in a step; 0 if no measurement needs it."""
     if WORK not in kernel.follows:
         return nothing
-    POWER0, POWER1, POWER2 = map(kernel.layout.at, stretches.POWERS)
+    POWER0, POWER1, POWER2 = map(kernel.layout.at, skips.POWERS)
 
     @inline
     def work_done(group, lane, h, power):
@@ -254,5 +254,5 @@ METHOD = Method(
     companion=1.2,
     error_order=4,
     least_error=0.03,
-    foresight=stretches.WORTHWHILE,
+    foresight=skips.WORTHWHILE,
 )

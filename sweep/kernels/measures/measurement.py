@@ -14,7 +14,7 @@ them in hooks, all of which are optional:
     make_settled       the same
     make_look          for one lane at every look, after that decision
     skip               for many images, when they have covered a stretch without steps
-    mode_lost          for many images, when the lift of a mode has failed
+    mode_lost          for many images, when the scale of a mode is given up
     read, doubts       once, when the trajectories have ended
 
 A hook `make_…` is itself called once, when the kernel is made.  It returns None, or a function marked
@@ -189,14 +189,14 @@ class Measurement:
         """Inline (group, lane, seen) -> None, called at every look with its findings, a `Look`."""
 
     def skip(self, table: Table, stretch: Stretch) -> None:
-        """Update `table` for a stretch that its images have covered without steps: start-up or a leap.
+        """Update `table` for a stretch that its images have covered without steps: start-up or a skip.
 
         The other quantities of the images are already those at the end of the stretch.
         """
 
     def mode_lost(self, table: Table, images: Array) -> None:
-        """Update `table` for a lifted mode that grew too large before it was lowered again, so that its lift is given
-        up.
+        """Update `table` for a rescaled mode that grew too large before its factor was taken back, so that the factor
+        is given up.
 
         `images` is a mask over the images of `table`, shape (images,).
         """

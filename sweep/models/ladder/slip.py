@@ -126,7 +126,7 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         offers=offers(couples, dissipates=law.coupled is None)
         | ({REVERSAL_TIME} if law == VISCOUS else set())
         | ({ENDING} if ending else set())
-        # A couple slows the spin of a body that does not rattle; leaps do not allow for that.
+        # A couple slows the spin of a body that does not rattle; skips do not allow for that.
         | ({MODES} if ending and not couples else set()),
         constants=record,
         start=lambda columns: starts.slipping(columns, surface),

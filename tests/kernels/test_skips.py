@@ -1,4 +1,4 @@
-"""Stretches without events: what the modes of a tiny rattle carry on is what steps would give."""
+"""Intervals without events: what the modes of a tiny rattle give is what steps would give."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from support import adaptive, columns
 from support.kernels import PAPER_FORM, finish, images, kernel
 
 import sweep
-from sweep.kernels.adams import stretches
+from sweep.kernels.adams import skips
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models import find
@@ -22,23 +22,23 @@ row = ADAMS.layout.index
 
 
 def stepped(table: np.ndarray, **how: Any) -> np.ndarray:
-    """The same without stretches."""
+    """The same without skips."""
     table = table.copy()
     table[:, row("quiet_energy")] = -1
     return finish(ADAMS, table, **how)
 
 
 @pytest.fixture
-def carried(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Steps that each stretch stood for."""
+def skipped(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Steps that each skip stood for."""
     seen: list[float] = []
-    move = stretches.move
+    move = skips.move
 
-    def watched(kernel: Any, part: np.ndarray, rattle: Rattle, steps: np.ndarray, lifts: Any) -> None:
+    def watched(kernel: Any, part: np.ndarray, rattle: Rattle, steps: np.ndarray, scales: Any) -> None:
         seen.extend(steps)
-        move(kernel, part, rattle, steps, lifts)
+        move(kernel, part, rattle, steps, scales)
 
-    monkeypatch.setattr(stretches, "move", watched)
+    monkeypatch.setattr(skips, "move", watched)
     return seen
 
 
@@ -71,16 +71,16 @@ def test_modes_move_as_the_full_model() -> None:
 
 
 @pytest.mark.parametrize("c", [1.0, 1.7])
-def test_the_power_of_friction_after_a_leap_is_that_of_the_full_model(c: float) -> None:
+def test_the_power_of_friction_after_a_skip_is_that_of_the_full_model(c: float) -> None:
     table = images(ADAMS, 0.05, 90_000.0, mu=60.0, a=10.0 * c, b=3.0 * c, c=c, x0=1e-7, y0=1e-7)
     rattle = Rattle.of(PAPER_FORM, *ADAMS.unpack(table))
-    stretches.move(ADAMS, table, rattle, np.full(1, 10.0 * BLOCK), np.zeros((1, 2)))
+    skips.move(ADAMS, table, rattle, np.full(1, 10.0 * BLOCK), np.zeros((1, 2)))
     _, (_, power, _, _) = slip.MODEL.rhs(ADAMS.model_states(table), ADAMS.unpack(table)[1])
     np.testing.assert_allclose(table[:, row("power0")], power, rtol=1e-3)
 
 
 def test_a_couple_slows_the_spin_of_a_body_that_hardly_rattles() -> None:
-    """As an exponential of time, without leaps at a constant spin."""
+    """As an exponential of time, without skips at a constant spin."""
     friction = {"mu": 60, "sigma": 1e-4}
     scene = {"body": {"b": 3.0}, "friction": friction, "start": {"n0": 0.002, "x0": 1e-9, "y0": 1e-9}}
     found = sweep.run(scene, method="adams", t_end=20_000, stop_early=False)
@@ -106,34 +106,34 @@ def test_distances_are_those_from_the_critical_spins() -> None:
     np.testing.assert_allclose(rattle.distances(), np.abs(body["n0"] - np.array([lower, upper])).T, rtol=0.07)
 
 
-def decide(sizes: Any, lifts: Any = (0.0, 0.0), left: float = 1e9, spin: float = 0.015) -> stretches.Stretch:
+def decide(sizes: Any, scales: Any = (0.0, 0.0), left: float = 1e9, spin: float = 0.015) -> skips.Skip:
     """What happens to a rattle of these sizes at a spin where the fast mode grows."""
     rattle, *_ = resolved(1e-6, mu=200.0, n0=spin)
     one = np.ones(1)
-    return stretches.plan(rattle, np.array([sizes]), np.array([lifts]), spin * one, 0.05 * one, left * one, 1e-8)
+    return skips.plan(rattle, np.array([sizes]), np.array([scales]), spin * one, 0.05 * one, left * one, 1e-8)
 
 
-def test_a_decayed_mode_is_lifted_and_let_down() -> None:
+def test_a_decayed_mode_is_rescaled_and_back() -> None:
     up = decide([1e-5, 1e-9])
     assert up.now[0]
-    assert up.lifts[0, 1] == 0
+    assert up.scales[0, 1] == 0
     rattle, *_ = resolved(1e-6, mu=200.0, n0=0.015)
     true = np.log(1e-5) + rattle.rates.real[0, 0] * up.steps[0] * 0.05
-    assert 1e-5 < np.exp(true + up.lifts[0, 0]) < 1e-2
-    # The turn of the spin by the lifted one stays below the tolerance.
-    assert rattle.distances().min() * np.exp(2 * (true + up.lifts[0, 0])) / 2 < 1.001e-8
-    down = decide([1e-5, 1e-9], lifts=(0.0, 20.0))
+    assert 1e-5 < np.exp(true + up.scales[0, 0]) < 1e-2
+    # The turn of the spin by the rescaled one stays below the tolerance.
+    assert rattle.distances().min() * np.exp(2 * (true + up.scales[0, 0])) / 2 < 1.001e-8
+    down = decide([1e-5, 1e-9], scales=(0.0, 20.0))
     assert down.now[0]
-    assert down.lifts[0, 1] == 0
+    assert down.scales[0, 1] == 0
     assert down.steps[0] > 1.9 * up.steps[0]
-    assert down.lifts[0, 0] > up.lifts[0, 0]
+    assert down.scales[0, 0] > up.scales[0, 0]
 
 
-def test_what_a_fast_reversal_stirs_up_is_not_let_down() -> None:
+def test_what_a_fast_reversal_stirs_up_is_not_rescaled() -> None:
     """At n = 0.05 the reversal itself leaves more of the decayed mode than there was."""
     fast = decide([1e-5, 1e-9], spin=0.05)
     assert not fast.now[0]
-    assert not fast.lifts.any()
+    assert not fast.scales.any()
 
 
 @pytest.mark.parametrize(
@@ -148,11 +148,11 @@ def test_hidden_modes_and_large_rattles_are_left_to_the_steps(sizes: list[float]
     assert least < found.wait[0] <= most
 
 
-def test_where_both_decay_nothing_is_lifted() -> None:
+def test_where_both_decay_nothing_is_rescaled() -> None:
     still = decide([1e-4, 1e-4], spin=-0.002, left=1e6)
     assert still.now[0]
     assert still.steps[0] == 1e6
-    assert not still.lifts.any()
+    assert not still.scales.any()
 
 
 def test_bending_is_the_size_of_what_steps_show() -> None:
@@ -169,15 +169,15 @@ def test_bending_is_the_size_of_what_steps_show() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-30, 1e-12])
-def test_tiny_starts_end_as_stepped_ones(size: float, carried: list[float]) -> None:
+def test_tiny_starts_end_as_stepped_ones(size: float, skipped: list[float]) -> None:
     table = images(
         ADAMS, 0.05, 12_000.0, settle=True, mu=[60.0, 200.0, 60.0], n0=[0.02, 0.05, -0.015], x0=size, y0=size
     )
     ours, theirs = finish(ADAMS, table.copy()), stepped(table)
-    assert sum(carried) > 0.1 * theirs[:, row("done")].sum()
+    assert sum(skipped) > 0.1 * theirs[:, row("done")].sum()
     for name in ("reversals", "status"):
         np.testing.assert_array_equal(ours[:, row(name)], theirs[:, row(name)])
-    # A leap may end a little after the look at which the other settles.
+    # A skip may end a little after the look at which the other settles.
     np.testing.assert_allclose(ours[:, row("done")], theirs[:, row("done")], atol=2 * BLOCK)
     # To t = 4000 to 1e-2, though the weaker mode is hidden for a while.
     np.testing.assert_allclose(ours[:, row("last_reversal")], theirs[:, row("last_reversal")], atol=0.05)
@@ -185,27 +185,27 @@ def test_tiny_starts_end_as_stepped_ones(size: float, carried: list[float]) -> N
     assert ours[:, row("violation")].max() < 2 * theirs[:, row("violation")].max() + 1e-15
 
 
-def test_spin_is_kept_to_the_tolerance(carried: list[float]) -> None:
+def test_spin_is_kept_to_the_tolerance(skipped: list[float]) -> None:
     for tolerance in (1e-8, 1e-5):
         tolerant = kernel("adams", tolerance=tolerance)
         table = images(tolerant, 0.05, 3000.0, mu=60.0, n0=[0.01, 0.02, 0.05], x0=1e-9, y0=1e-9)
         ours, theirs = finish(tolerant, table.copy(), settle=False), stepped(table, settle=False)
-        assert carried
+        assert skipped
         np.testing.assert_allclose(ours[:, row("spin")], theirs[:, row("spin")], atol=tolerance)
 
 
-def test_long_rest_and_upright_spin_take_few_steps(carried: list[float]) -> None:
-    """Decayed, at rest, or upright for ever: to t = 1e6 in one stretch each."""
+def test_long_rest_and_upright_spin_take_few_steps(skipped: list[float]) -> None:
+    """Decayed, at rest, or upright for ever: to t = 1e6 in one skip each."""
     table = images(ADAMS, 0.1, 1e6, settle=True, n0=[0.001, 0.0, 0.05, 0.0], x0=[0.01, 0.0, 0.0, 0.01])
     table[2, 0:7] = images(ADAMS, 0.1, 1e6, x0=0.0, y0=0.0)[0, 0:7]
     finish(ADAMS, table, settle=False)
-    assert len(carried) >= 3
+    assert len(skipped) >= 3
     assert (table[:, row("status")] == TIME_LIMIT).all()
     np.testing.assert_array_equal(table[:, row("done")], table[:, row("goal")])
     assert np.isfinite(table[:, :7]).all()
 
 
-def test_windows_continue_after_a_stretch() -> None:
+def test_windows_continue_after_a_skip() -> None:
     table = images(ADAMS, 0.1, 1e5, n0=0.001)
     finish(ADAMS, table, settle=False)
     one = table[0]
@@ -237,11 +237,11 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         cells.append(states.shape[1])
         return of(form, states, constants)
 
-    monkeypatch.setattr(stretches.Rattle, "of", counted)
+    monkeypatch.setattr(skips.Rattle, "of", counted)
     return cells
 
 
-def test_no_looks_where_no_stretch_can_help(looks: list[int]) -> None:
+def test_no_looks_where_no_skip_can_help(looks: list[int]) -> None:
     """A look takes as long as two thousand steps: to t = 400 they were two thirds of the time."""
     finish(ADAMS, images(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
     assert not looks
@@ -254,5 +254,5 @@ def test_no_looks_where_no_stretch_can_help(looks: list[int]) -> None:
     # One that is on its way down already needs less time.
     assert decide([1e-1, 1e-1], left=8000, spin=0.05).wait[0] == np.inf
     assert decide([1e-1, 1e-9], left=8000, spin=0.05).wait[0] < np.inf
-    # What has been lifted is let down.
-    assert decide([1e-1, 1e-9], lifts=(0.0, 20.0), left=7000).wait[0] < np.inf
+    # What has been rescaled gets its own size back.
+    assert decide([1e-1, 1e-9], scales=(0.0, 20.0), left=7000).wait[0] < np.inf
