@@ -94,10 +94,14 @@ for name, loaded in (("run", set()), ("load_config", {"numpy"}), ("plot", {"nump
     python("-c", program)
 
 
-MOMENTS = "click sweep.cli ruamel.yaml numpy pydantic sweep.config numba xarray sweep.engine.run"
-
-
-@pytest.mark.parametrize("moment", MOMENTS.split())
+@pytest.mark.parametrize(
+    "moment",
+    [
+        pytest.param("click", id="before there is a command"),
+        pytest.param("pydantic", id="while the configuration is read"),
+        pytest.param("numba", id="before the run"),
+    ],
+)
 def test_an_interrupt_during_start_is_one_line(moment: str, write: Write, tmp_path: Path) -> None:
     command = [sys.executable, "-X", "importtime", "-m", "sweep", "run", write(SMALL), "--output", tmp_path / "out"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

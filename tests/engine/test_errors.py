@@ -57,7 +57,7 @@ def test_estimates_are_near_true_errors(method: str, steps: list[float]) -> None
 def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever is measured."""
     lengthen(monkeypatch, 3)
-    for measure in (default_measures("slip"), ["reversals", "margin"]):
+    for measure in (default_measures("slip"), ["reversals", {"reversal_times": 3}]):
         repeated = cells([BODY], method="adams", measure=measure)
         assert abs(float(repeated.spin_final[0]) - SPINS[0]) < 1e-8
         assert float(repeated.spin_error[0]) < 1e-8

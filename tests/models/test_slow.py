@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.kernels import default_measures
 
 import sweep
 from sweep.jit import compiled
@@ -16,7 +17,8 @@ from sweep.models.theory import linear
 from sweep.plots import quantities
 from sweep.prediction import predict
 
-MEASURE = ["reversals", "margin", "estimate"]
+MEASURE = [*default_measures("slip"), "estimate"]
+MEASURE_SIGMA = [*default_measures("slip+viscous+sigma"), "estimate"]
 LINE: dict[str, Any] = {"body": {"b": {"start": 1.5, "stop": 9.5, "num": 9}}, "friction": {"mu": [30, 80, 150]}}
 
 
@@ -43,7 +45,7 @@ def test_the_matrix_has_the_eigenvalues_of_the_full_model() -> None:
 
 @pytest.mark.parametrize(("n0", "share"), [(0.02, 1.0), (0.05, 0.85)])
 def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
-    asked = LINE | {"start": {"n0": n0}, "measure": ["reversals", "estimate"]}
+    asked = LINE | {"start": {"n0": n0}, "measure": MEASURE}
     found = sweep.run(asked)
     right = (found.reversals == found.reversals_estimated).values
     assert right.mean() >= share
@@ -71,7 +73,7 @@ def test_counts_are_those_of_the_full_model(n0: float, share: float) -> None:
 )  # fmt: skip
 def test_counts_of_hard_cells(given: dict[str, float], what: str) -> None:
     case = {name: values.tolist() for name, values in columns(**given).items()}
-    found = sweep.run({"cases": case, "measure": ["reversals", "estimate"], "integrator": {"method": "auto"}})
+    found = sweep.run({"cases": case, "measure": MEASURE, "integrator": {"method": "auto"}})
     assert found.reversals_estimated == found.reversals, what
 
 
@@ -79,7 +81,7 @@ def test_counts_of_hard_cells(given: dict[str, float], what: str) -> None:
 def test_counts_of_a_body_that_a_couple_slows(sigma: float) -> None:
     """It reverses less often the stronger the couple is."""
     friction = {"mu": [30, 80, 150], "sigma": sigma}
-    found = sweep.run(LINE | {"friction": friction, "start": {"n0": 0.05}, "measure": MEASURE})
+    found = sweep.run(LINE | {"friction": friction, "start": {"n0": 0.05}, "measure": MEASURE_SIGMA})
     certain, right = found.certain == 1, found.reversals == found.reversals_estimated
     assert float(right.where(certain).mean()) > 0.85
     assert float(right.where(certain & (found.estimate_certain == 1)).mean()) == 1
@@ -89,7 +91,7 @@ def test_counts_of_a_body_that_a_couple_slows(sigma: float) -> None:
 def test_a_count_whose_last_reversal_a_drag_may_prevent_is_not_sure() -> None:
     """Six by an independent integration too: the tiny mode that would turn the spin again grows back too early."""
     found = sweep.run({"body": {"b": 3.0}, "friction": {"mu": 160.0, "sigma": 9.9727e-4}, "start": {"n0": 0.05},
-                       "measure": MEASURE})  # fmt: skip
+                       "measure": MEASURE_SIGMA})  # fmt: skip
     assert (found.reversals, found.reversals_estimated, found.estimate_certain) == (6, 7, 0)
 
 
@@ -102,7 +104,7 @@ def test_a_mode_that_fell_far_makes_no_count_sure() -> None:
 def test_a_couple_makes_a_count_unsure_that_a_small_mode_decides() -> None:
     """The spin falls below the critical one while the mode that would reverse it is still tiny; it is estimated to."""
     found = sweep.run({"body": {"b": 4.2}, "friction": {"mu": 109.0909, "sigma": 1e-3}, "start": {"n0": 0.02},
-                       "measure": MEASURE})  # fmt: skip
+                       "measure": MEASURE_SIGMA})  # fmt: skip
     assert (found.reversals, found.reversals_estimated, found.estimate_certain) == (2, 3, 0)
 
 
@@ -175,7 +177,7 @@ def test_a_mode_that_harmonics_of_the_other_drive_is_not_sure() -> None:
 def test_a_start_by_angles_and_rates_is_estimated() -> None:
     """The same motion as by n0, x0 and y0 where the body spins about the vertical; and another one that is pushed."""
     start = {"roll": 0.01, "pitch": 0.002, "omega3": [-0.05, 0.05], "omega1": [0.0, 0.01]}
-    found = sweep.run(LINE | {"start": start, "measure": ["reversals", "margin", "estimate"]})
+    found = sweep.run(LINE | {"start": start, "measure": MEASURE})
     right, certain = (found.reversals == found.reversals_estimated).values, found.certain.values == 1
     assert right[certain].mean() > 0.8
     assert found.estimate_certain.values.any()
@@ -191,7 +193,7 @@ def test_a_body_in_si_has_the_same_counts() -> None:
     asked = {
         "units": "SI", "body": {"a": 10 * length, "b": b.tolist(), "c": length, "delta": 0.03, "mass": 1.0},
         "friction": {"mu": [mu / (length * rate) for mu in (30, 80, 150)]},
-        "start": {"n0": 0.05 * rate, "x0": 0.01 * length, "y0": 0.01 * length}, "measure": ["reversals", "estimate"],
+        "start": {"n0": 0.05 * rate, "x0": 0.01 * length, "y0": 0.01 * length}, "measure": MEASURE,
     }  # fmt: skip
     np.testing.assert_array_equal(sweep.predict(asked).reversals_estimated.values, paper.reversals_estimated.values)
 
@@ -202,7 +204,7 @@ def test_its_counts_are_called_estimated() -> None:
     assert alone.reversals.attrs["long_name"] == alone.reversals_estimated.attrs["long_name"]
     formula = sweep.run(LINE | {"model": "analytic"})
     assert formula.reversals.attrs["description"] == "Spin reversals predicted by Takano (2011), cases (I) and (II)."
-    both = sweep.run({"friction": {"mu": [60, 80]}, "measure": ["reversals", "estimate"]})
+    both = sweep.run({"friction": {"mu": [60, 80]}, "measure": MEASURE})
     assert quantities.field(alone, "difference").attrs["long_name"] == "estimated − predicted"
     assert quantities.field(both, "difference").attrs["long_name"] == "simulated − predicted"
 

@@ -88,7 +88,6 @@ def threads(number: int) -> Iterator[None]:
 SHARED = [
     ("adams", "slip", default_measures("slip")),
     ("dopri5", "slip", default_measures("slip")),
-    ("adams", "slip", ("reversals", "margin")),
     ("adams", "slip", ("reversals", "reversal_times=3")),
     ("dopri5", "noslip", default_measures("noslip")),
     ("dopri5", "effective", default_measures("effective")),
@@ -96,7 +95,6 @@ SHARED = [
     ("dopri5", "slip+coulomb+sigma", default_measures("slip+coulomb+sigma")),
     ("dopri5", "slip+viscous+offset", default_measures("slip+viscous+offset")),
     ("dopri5", "slip", ()),
-    ("dopri5", "slip", ("reversals",)),
     ("dopri5", "slip", ("reversals", "reversal_times=3")),
     ("dopri5", "averaged", ("reversals",)),
 ]
