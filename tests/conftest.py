@@ -90,6 +90,18 @@ def client(local: distributed.LocalCluster) -> Iterator[distributed.Client]:
         yield client
 
 
+@pytest.fixture(scope="session")
+def threaded() -> Iterator[distributed.Client]:
+    """A client of a scheduler and a worker in this process, which start in a fraction of a second."""
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs="CRITICAL"
+        ) as cluster,
+        distributed.Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """Debian's chromium: playwright's own is downloaded from a place that many machines do not reach."""

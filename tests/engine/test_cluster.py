@@ -162,17 +162,16 @@ def test_types_of_cpu_are_listed(config: Path, client: distributed.Client) -> No
     [((0, "0" * 16), "other sources of the model or kernel"), ((1, "numba 0.1"), "other versions: .*, now numba 0.1")],
 )
 def test_another_program_in_a_worker_is_refused(
-    config: Path, client: distributed.Client, changed: tuple[int, str], said: str
+    config: Path, threaded: distributed.Client, changed: tuple[int, str], said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = list(sources())
     own[changed[0]] = changed[1]
-    with (
-        patched(client, "sweep.engine.cluster.sources", lambda: tuple(own)),
-        pytest.raises(FileError, match=f"tcp://.*: the worker has {said}"),
-    ):
-        sweep.run(config, client=client)
+    monkeypatch.setattr("sweep.engine.cluster.sources", lambda: tuple(own))
+    with pytest.raises(FileError, match=f"inproc://.*: the worker has {said}"):
+        sweep.run(config, client=threaded)
 
 
+@pytest.mark.campaign
 def test_a_tile_that_kills_its_workers_is_reported(
     config: Path, client: distributed.Client, local: distributed.LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -254,21 +253,21 @@ def test_a_run_that_lost_its_scheduler_computes_what_is_missing_on_another(
     assert contents(out) == by_threads
 
 
-def test_a_client_that_cannot_be_used_is_refused(config: Path, local: distributed.LocalCluster) -> None:
-    closed = distributed.Client(local, set_as_default=False)
+def test_a_client_that_cannot_be_used_is_refused(config: Path, threaded: distributed.Client) -> None:
+    closed = distributed.Client(threaded.cluster, set_as_default=False)
     closed.close()
     with pytest.raises(sweep.InputError, match=r"^client: is closed; give a client that is connected"):
         sweep.run(config, client=closed)
 
     async def asynchronous() -> None:
-        async with distributed.Client(local.scheduler_address, asynchronous=True, set_as_default=False) as client:
+        async with distributed.Client(threaded.cluster.scheduler_address, asynchronous=True, set_as_default=False) as client:
             with pytest.raises(sweep.InputError, match=r"^client: is asynchronous; give one that was made with"):
                 sweep.run(config, client=client)
 
     asyncio.run(asynchronous())
 
 
-def test_formulas_run_on_a_cluster(config: Path, client: distributed.Client) -> None:
+def test_formulas_run_on_a_cluster(config: Path, threaded: distributed.Client) -> None:
     asked = {"model": "analytic"}
-    here, there = sweep.run(config, **asked), sweep.run(config, client=client, **asked)
+    here, there = sweep.run(config, **asked), sweep.run(config, client=threaded, **asked)
     xr.testing.assert_identical(here.drop_attrs(deep=False), there.drop_attrs(deep=False))

@@ -127,6 +127,7 @@ def test_the_process_that_compiles_gets_the_text_of_the_file(folder: Path) -> No
         assert process.wait() != 0
 
 
+@pytest.mark.campaign
 def test_workers_need_no_file(few: xr.Dataset, folder: Path, client: distributed.Client) -> None:
     """They get its text with the configuration."""
     config = load_config(folder / "pendulum.yaml", FEW)
@@ -147,9 +148,9 @@ It fails late at high spins: one text for two tests, for each text takes a kerne
 """
 
 
-def test_an_error_in_a_worker_names_its_line(folder: Path, client: distributed.Client) -> None:
+def test_an_error_in_a_worker_names_its_line(folder: Path, threaded: distributed.Client) -> None:
     (folder / "pendulum.py").write_text(ROLLING, encoding="utf-8")
-    for where in (None, client):
+    for where in (None, threaded):
         with pytest.raises(InputError, match=r"pendulum.py:\d+: ValueError: too much") as error:
             sweep.run(folder / "pendulum.yaml", client=where, **FEW)
         assert 'raise ValueError("too much")' in ROLLING.splitlines()[error.value.faults[0].line - 1]
