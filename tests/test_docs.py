@@ -3,8 +3,7 @@
 Fenced blocks are run as they stand, page by page from top to bottom, in a folder with the configurations of
 `configs/` on coarser grids: ```console (lines that begin with `$ `), ```python and ```{code-cell}; every ```yaml
 must be a configuration; a ```{code-block} with a caption is a file.  A block that must not be run has a comment above
-it that says why: <!-- not run: takes minutes -->.  With <!-- campaign: takes a minute --> it is run among the
-campaigns alone.
+it that says why: <!-- not run: takes minutes -->.  It takes minutes, and is a campaign.
 
 What a page shows as output is made when the pages are built, by ```{code-cell}, ```{console} and ```{python}.  A page
 that has nothing else is run then alone.
@@ -39,7 +38,7 @@ def _name(page: Path) -> str:
 
 
 _FENCE = re.compile(
-    r"(?:<!-- (?P<when>not run|campaign): [^\n]+ -->\n+)?"
+    r"(?P<skipped><!-- not run: [^\n]+ -->\n+)?"
     r"^(?P<indent> *)```(?P<kind>\S*)[^\n]*\n(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
@@ -55,8 +54,7 @@ class Block:
     line: int
     kind: str
     text: str
-    when: str
-    """Empty, "not run" or "campaign"."""
+    skipped: bool
 
     def __str__(self) -> str:
         return f"{self.page.relative_to(ROOT)}:{self.line}"
@@ -68,7 +66,7 @@ def blocks(page: Path) -> Iterator[Block]:
         indent = len(match["indent"])
         lines = "".join(line[indent:] or "\n" for line in match["text"].splitlines(keepends=True))
         line = text.count("\n", 0, match.start("kind")) + 1
-        yield Block(page, line, match["kind"], lines, match["when"] or "")
+        yield Block(page, line, match["kind"], lines, bool(match["skipped"]))
 
 
 def commands(block: Block) -> list[str]:
@@ -77,10 +75,10 @@ def commands(block: Block) -> list[str]:
     return [line[2:] for line in block.text.splitlines()]
 
 
-def _runs(page: Path, *when: str) -> list[Block]:
+def _runs(page: Path) -> list[Block]:
     """The blocks to run, none if building the pages runs all of them."""
     kinds = ("console", "{console}", "python", "{python}", "{code-cell}", "yaml", "{code-block}")
-    found = [block for block in blocks(page) if block.kind in kinds and block.when in when]
+    found = [block for block in blocks(page) if block.kind in kinds and not block.skipped]
     return found if {block.kind for block in found} & {"console", "python", "yaml"} else []
 
 
@@ -134,20 +132,11 @@ def _check_configuration(block: Block, folder: Path) -> None:
     sweep.load_config(path)
 
 
-@pytest.mark.parametrize(
-    ("page", "when"),
-    [
-        *((page, [""]) for page in PAGES if _runs(page, "")),
-        *(pytest.param(page, ["", "campaign"], marks=pytest.mark.campaign)
-          for page in PAGES if _runs(page, "campaign")),
-    ],
-    ids=lambda value: _name(value) if isinstance(value, Path) else "".join(value),
-)  # fmt: skip
-def test_what_a_page_shows_runs(
-    page: Path, when: list[str], checkout: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+@pytest.mark.campaign
+@pytest.mark.parametrize("page", [page for page in PAGES if _runs(page)], ids=_name)
+def test_what_a_page_shows_runs(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names: dict[str, Any] = {}
-    found = _runs(page, *when)
+    found = _runs(page)
     if found[0].kind == "{code-cell}":  # Sphinx runs a notebook in its own folder
         folder = checkout / page.relative_to(ROOT).parent
         folder.mkdir(parents=True, exist_ok=True)

@@ -84,7 +84,7 @@ def test_shipped_configurations_end_decided(name: str) -> None:
     assert float(found.certain.mean()) >= 0.98
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["b", "quick"])
 def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml", estimate_errors=False)

@@ -89,7 +89,7 @@ def test_the_map_shows_where_it_turns_over() -> None:
     assert not counts.sel(n0=1.0).any()
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 def test_no_settled_top_reverses_later() -> None:
     """Tops of any shape, started at any inclination; some of them reverse a dozen times."""
     draw, n = np.random.default_rng(1).uniform, 400

@@ -59,7 +59,7 @@ def eigenvalues(model: Model, columns: Columns) -> Array:
     return np.linalg.eigvals(linear.jacobian(model, model.constants.of(columns), columns["n0"]))
 
 
-@pytest.mark.parametrize("number", [8, pytest.param(200, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("number", [8, pytest.param(200, marks=pytest.mark.release)])
 def test_a_simulated_rattle_grows_as_the_eigenvalues_say(number: int, write: Write) -> None:
     """At rest and far beyond n_c1; and it begins to grow where the critical spins of a dataset are."""
     bodies = wide_bodies(number)

@@ -206,7 +206,7 @@ def found_near(problem: Toy, *places: list[float]) -> list[Minimum]:
     return run_concurrently([partial(minimise, place=np.array(place)) for place in places], problem.answers)
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 def test_intervals_hold_as_many_truths_as_they_say() -> None:
     """Of noise that the film does not tell; 200 films, so that a share has a standard error of 3 and 2 %."""
     random, held = np.random.default_rng(7), []
@@ -231,7 +231,7 @@ def test_an_interval_holds_other_minima_that_fit_as_well() -> None:
         assert low[1] < 0.15 < 0.34 < high[1]
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 @pytest.mark.parametrize("places", [[[0.7, 0.35]], [[0.7, 0.35], [0.3, 0.15]]], ids=["other valley", "both"])
 def test_intervals_of_two_valleys_hold_as_many_truths_as_they_say(places: list[list[float]]) -> None:
     """Also where the search did not find the valley of the truth; 60 films, so that shares have errors of 6 and 3 %."""
@@ -602,7 +602,7 @@ def random_film(random: np.random.Generator) -> tuple[dict[str, Any], Film, np.n
     return told | {"start": guess}, Film(times, value, what=what), exact
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 def test_good_films_of_random_bodies_are_called_good_and_have_the_best_minimum() -> None:
     """A few of the films that the page on fits counts."""
     random, verdicts = np.random.default_rng(1), list[tuple[bool, bool]]()
