@@ -59,7 +59,7 @@ GROWN = {
     "more, dopri5": (by("dopri5", ONE), by("dopri5", MORE), "12 of 24"),
     "later, dopri5": (by("dopri5", ONE), by("dopri5", LATER), ANY),
     "measured": (by("adams", ONE) + MEASURED, by("adams", MORE) + MEASURED, "12 of 24"),
-    "measured further": (by("dopri5", ONE), by("dopri5", ONE) + MEASURED, "no"),
+    "measured further": (by("dopri5", ONE) + "measure: []\n", by("dopri5", ONE) + MEASURED, "no"),
     "single": (SINGLE, SINGLE.replace("100", "300"), "no"),
     # Axes that the paper's models do not have, each from one value to several.
     "gravity": (SCENE, SCENE.replace("gravity: 9.81", "gravity: [1.62, 9.81]"), "2 of 4"),
