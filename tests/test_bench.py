@@ -85,7 +85,7 @@ assert report.bench(Path(sys.argv[1]), print, Effort(trajectories=4, repeats=1, 
 @pytest.mark.campaign
 def test_a_tiny_run_reports_every_method(tmp_path: Path) -> None:
     """Also one that has just been added to the registry."""
-    told = python("-c", TINY, tmp_path).stdout
+    printed = python("-c", TINY, tmp_path).stdout
     with (tmp_path / "bench.csv").open(encoding="utf-8", newline="") as stream:
         lines = list(csv.DictReader(stream))
     everywhere = {("slip", method) for method in ("dopri5", "adams", "twin")}
@@ -95,7 +95,7 @@ def test_a_tiny_run_reports_every_method(tmp_path: Path) -> None:
         low, middle, high = (float(line[key]) for key in ("ms_smallest", "ms_median", "ms_largest"))
         assert 0 < low <= middle <= high
         assert 0 < float(line["spin_error"]) < 1e-3
-    assert "short [twin]" in told
+    assert "short [twin]" in printed
     page = (tmp_path / "bench.html").read_text(encoding="utf-8")
     assert not re.search("https?:", page)  # letters alone occur in pictures by chance
     assert [page.count(part) for part in ("<h2>", "data:image/png;base64")] == [2, 1]
@@ -116,7 +116,7 @@ def test_methods_are_compared_at_equal_error() -> None:
 
 
 @pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
-def test_exit_code_tells_whether_the_hard_cases_hold(
+def test_the_exit_code_shows_whether_the_hard_cases_hold(
     holds: bool, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(report, "hard_cases", lambda: Section("Some", [states("<one>", "adams", "a", "b", holds)]))

@@ -1,4 +1,4 @@
-"""What Python may hand in, what it is told, and what it gets back."""
+"""What Python may hand in, how it is refused, and what it gets back."""
 
 import sys
 import types
@@ -281,7 +281,7 @@ def test_a_dataset_needs_no_other_file_for_its_trajectories(tmp_path: Path, name
 
 
 @pytest.mark.parametrize("text", ["configs/mu.yaml", "5", "[1]", "a: ["])
-def test_what_a_dataset_tells_has_to_be_a_configuration(text: str) -> None:
+def test_the_configuration_in_a_dataset_has_to_be_one(text: str) -> None:
     dataset = sweep.predict(SAID)
     dataset.attrs["config"] = text
     with pytest.raises(InputError, match="config"):

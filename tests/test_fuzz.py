@@ -87,9 +87,9 @@ def test_messages_contain_no_control_characters(write: Write, tmp_path: Path) ->
     assert len(said.splitlines()) == 1
     assert said.strip().isprintable()
     xr.Dataset({"status": ("b", [1])}, attrs={"title": "\x1b[2J", "sweep_kind": "run"}).to_netcdf(tmp_path / "odd.nc")
-    told = invoke("info", tmp_path / "odd.nc").stdout
-    assert "[2J" in told
-    assert "\x1b" not in told
+    printed = invoke("info", tmp_path / "odd.nc").stdout
+    assert "[2J" in printed
+    assert "\x1b" not in printed
 
 
 def test_the_number_of_trajectories_is_limited(write: Write) -> None:

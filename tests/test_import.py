@@ -46,7 +46,7 @@ def test_the_import_alone_loads_no_xarray() -> None:
     assert run("import sys, sweep; print('xarray' in sys.modules)").stdout == "False\n"
 
 
-def test_windows_is_told_about_wsl() -> None:
+def test_windows_is_pointed_to_wsl() -> None:
     result = run("import sys; sys.platform = 'win32'; sys.modules['fcntl'] = None; import sweep")
     last = result.stderr.splitlines()[-1]
     assert last.startswith("ImportError: sweep runs on Linux and macOS; on Windows, install it in WSL")

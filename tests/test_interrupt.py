@@ -24,11 +24,11 @@ def ctrl_c() -> None:
 
 
 def reached(work: Callable[[Callable[[str], None]], None]) -> list[str]:
-    """What a block tells before Ctrl-C is raised from it."""
-    told = list[str]()
+    """What a block reports before Ctrl-C is raised from it."""
+    reported = list[str]()
     with pytest.raises(KeyboardInterrupt):
-        deferred()(work)(told.append)
-    return told
+        deferred()(work)(reported.append)
+    return reported
 
 
 def test_raised_at_the_next_point_and_once() -> None:

@@ -59,7 +59,7 @@ def test_a_wrong_coefficient_of_the_formulas_is_found(monkeypatch: pytest.Monkey
     assert failures(lambda: theory.formulas().rows)
 
 
-def test_exit_code_tells_whether_all_rows_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_exit_code_shows_whether_all_rows_hold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def two(holds: bool) -> Callable[[], Section]:
         return lambda: Section(
             "Two", [rows.below("one", "eq", 1.0, 2.0, "why"), rows.states("<two>", "eq", "a", "b", holds)]

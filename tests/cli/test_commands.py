@@ -23,10 +23,10 @@ def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr
     result = invoke("run", write(), "--output", tmp_path / "out")
     assert (result.exit_code, "resuming" in result.stderr) == (0, False)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"small.nc", "small.png"}
-    told = invoke("info", tmp_path / "out" / "small.nc").stdout
+    printed = invoke("info", tmp_path / "out" / "small.nc").stdout
     assert "12 cells (mu 2 × b 3 × n0 2)" in result.stdout
-    assert "12 cells (mu 2 × b 3 × n0 2)" in told
-    assert len(told.splitlines()) <= 24
+    assert "12 cells (mu 2 × b 3 × n0 2)" in printed
+    assert len(printed.splitlines()) <= 24
     assert "numba_version" in invoke("info", "--all", tmp_path / "out" / "small.nc").stdout
     with xr.open_dataset(tmp_path / "out" / "small.nc") as stored:
         same_numbers(stored.load(), small)

@@ -101,7 +101,7 @@ def test_a_closed_pipe_ends_a_command_silently(command: str, tmp_path: Path) -> 
     assert [line for line in (done.stderr or "").splitlines() if "already complete" not in line] == []
 
 
-def test_a_command_tells_what_it_wrote(write: Write, tmp_path: Path) -> None:
+def test_a_command_reports_what_it_wrote(write: Write, tmp_path: Path) -> None:
     command, out = ("run", write(TEXT), "--output", tmp_path / "out"), tmp_path / "out" / "quick"
     assert invoke(*command).stdout.endswith(f"\nwrote {out}.nc and .png\n")
     again = invoke(*command)
@@ -129,7 +129,7 @@ def test_a_terminal_of_any_width_keeps_the_bar(width: int, unit: str, monkeypatc
     assert (unit in line) == (width >= 80)
 
 
-def test_a_log_tells_now_and_then_how_far_a_run_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_reports_now_and_then_how_far_a_run_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rich draws its bar nowhere but on a terminal, and elsewhere once, at the end."""
     screen = io.StringIO()
     with Terminal() as terminal:

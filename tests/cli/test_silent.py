@@ -118,7 +118,7 @@ def test_a_status_that_was_averaged_is_no_status() -> None:
     assert summary(status=("mu", [1.5, 2.0])) == "no status of individual cells: averaged"
 
 
-def test_a_probability_that_nobody_knows_is_no_number() -> None:
+def test_an_unknown_probability_is_shown_as_unknown() -> None:
     nothing = {name: ("count", [np.nan]) for name in ("probability", "probability_low", "probability_high")}
     text = summary(status=("sample", np.array([3, 3], "int8")), count=("count", [1]), **nothing)
     assert text.splitlines()[1] == "probability: 1 or more unknown"
@@ -129,7 +129,7 @@ def test_a_probability_that_nobody_knows_is_no_number() -> None:
     [(0.0, "0 s"), (5e-5, "under 1 ms"), (0.351, "0.35 s"), (119, "120 s"), (200, "3 min 20 s"), (3400, "57 min"),
      (4800, "1 h 20 min"), (3600, "1 h"), (90000, "25 h"), (200000, "2 days 8 h"), (1e7, "116 days")],
 )  # fmt: skip
-def test_a_time_is_said_as_people_say_it(seconds: float, said: str) -> None:
+def test_a_duration_is_written_as_people_write_it(seconds: float, said: str) -> None:
     from sweep.faults import duration
 
     assert duration(seconds) == said

@@ -106,12 +106,12 @@ def test_an_interrupt_during_start_is_one_line(moment: str, write: Write, tmp_pa
     command = [sys.executable, "-X", "importtime", "-m", "sweep", "run", write(SMALL), "--output", tmp_path / "out"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
-        told = []
+        printed = []
         for line in process.stderr:
-            told.append(line)
+            printed.append(line)
             if _IMPORT.fullmatch(line.rstrip()) and line.split()[-1] == moment:
                 process.send_signal(signal.SIGINT)
-                told += process.stderr.readlines()
+                printed += process.stderr.readlines()
         assert process.wait() == 130
-    assert [line for line in told if not line.startswith("import time:")] == ["interrupted\n"]
+    assert [line for line in printed if not line.startswith("import time:")] == ["interrupted\n"]
     assert not (tmp_path / "out").exists()

@@ -41,7 +41,7 @@ def test_numbers_are_those_of_the_shape(path: Path) -> None:
         assert given[name].numbers[0] == pytest.approx(value, rel=6e-5), name
 
 
-def test_the_wackelstein_has_the_inertia_that_its_head_tells() -> None:
+def test_the_wackelstein_has_the_inertia_that_its_head_states() -> None:
     given = load_config(ROOT / "configs" / "wackelstein.yaml").parameters
     half, more, across = 9e-4, 7e-4 * np.cos(0.2), 7e-4 * np.sin(0.2)
     for name, value in {"Ixx": half - more, "Iyy": half + more, "Izz": 1.7e-3, "Ixy": across}.items():

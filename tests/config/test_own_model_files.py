@@ -122,13 +122,13 @@ def test_a_file_that_cannot_be_read_is_refused(folder: Path, name: str) -> None:
 
 
 def test_its_code_is_announced_before_it_runs(folder: Path, ran: Path) -> None:
-    told = []
+    announced = []
 
     def announce(words: str) -> None:
-        told.append((words, ran.exists()))
+        announced.append((words, ran.exists()))
 
     load_config(folder / "pendulum.yaml", announce=announce)
-    ((words, already),) = told
+    ((words, already),) = announced
     assert words.startswith(f"running the code of {folder / 'pendulum.py'}")
     assert ran.exists()
     assert not already

@@ -148,7 +148,7 @@ def test_a_broken_configuration_is_refused_with_its_place(number: int, write: Wr
     assert sorted(tmp_path.iterdir()) == [file]
 
 
-def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None:
+def test_all_faults_are_reported_at_once_in_the_order_of_lines(write: Write) -> None:
     text = "colour: red\nintegrator: {t_end: -1}\nstart: {n0: x}\nmeasure: [spin]\nfriction: {nu: 3}\nbody: {a: 0}\n"
     with pytest.raises(InputError) as error:
         load_config(write(text))
@@ -159,7 +159,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_lines(write: Write) -> None
     assert (len(lines), lines[-1]) == (21, f"{file}: 36 more faults")
 
 
-def test_faults_of_settings_without_lines_are_told_in_the_order_of_the_laws() -> None:
+def test_faults_of_settings_without_lines_are_reported_in_the_order_of_the_laws() -> None:
     """Not in that of a set of strings, which changes from process to process."""
     foreign = ["speed", "mu_static", "speed_stick", "mu_viscous", "radius_contact"]
     with pytest.raises(InputError) as error:
@@ -167,7 +167,7 @@ def test_faults_of_settings_without_lines_are_told_in_the_order_of_the_laws() ->
     assert [line.split(":")[0] for line in str(error.value).splitlines()] == [f"friction.{name}" for name in foreign]
 
 
-def test_another_process_is_told_of_faults() -> None:
+def test_faults_reach_another_process() -> None:
     error = fault_of("wrong", "body", "a", file="small.yaml", line=3)
     again = pickle.loads(pickle.dumps(error))
     assert (str(again), again.faults) == ("small.yaml:3: body.a: wrong", error.faults)

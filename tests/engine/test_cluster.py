@@ -260,7 +260,9 @@ def test_a_client_that_cannot_be_used_is_refused(config: Path, threaded: distrib
         sweep.run(config, client=closed)
 
     async def asynchronous() -> None:
-        async with distributed.Client(threaded.cluster.scheduler_address, asynchronous=True, set_as_default=False) as client:
+        async with distributed.Client(
+            threaded.cluster.scheduler_address, asynchronous=True, set_as_default=False
+        ) as client:
             with pytest.raises(sweep.InputError, match=r"^client: is asynchronous; give one that was made with"):
                 sweep.run(config, client=client)
 

@@ -117,8 +117,8 @@ def test_damaged_tiles_and_images_are_computed_again(
     for name in ("1.npz", "0abc.npz", "notes.txt", "000099.npz", ".x.part", "000099.npz.orig"):  # ignored
         (out / "small.checkpoint" / name).write_bytes(b"mine")
     result = invoke("run", config, "--output", out)
-    told = [f"{path.name}: damaged" in result.stderr for path in files]
-    assert (result.exit_code, told) == (0, [how != "removed"] * 4), result.stderr
+    reported = [f"{path.name}: damaged" in result.stderr for path in files]
+    assert (result.exit_code, reported) == (0, [how != "removed"] * 4), result.stderr
     assert contents(out) == undisturbed
 
 
@@ -210,7 +210,7 @@ def test_another_name_is_another_run(config: Path, out: Path) -> None:
 
 @pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.campaign)])
 def test_every_flipped_bit_of_a_tile_is_seen(every: int, tmp_path: Path) -> None:
-    """Numpy alone reads past some: a header that tells a smaller shape ends before the checksum."""
+    """Numpy alone reads past some: a header with a smaller shape ends before the checksum."""
     identity = Identity("name: x", "0" * 16, "1" * 16, "sweep 0")
     # The directory's entry of the second takes 64 bytes: one bit makes it the comment of the first.
     tile = {"status": np.arange(3000.0), "fourteen_chars": np.ones(1), "cpu": np.array("zen")}

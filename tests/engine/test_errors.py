@@ -157,15 +157,15 @@ def test_wide_cells_keep_the_tolerance_or_say_so(tolerance: float) -> None:
     rows = np.genfromtxt(ROOT / "data" / "reference_wide.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     rows = rows[rows["end"] == "time_limit"]
     found = cells([{name: row[name] for name in STANDARD} for row in rows], method="adams", tolerance=tolerance)
-    error, told = np.abs(found.spin_final.values - rows["spin_400"]), found.spin_error.values
+    error, estimated = np.abs(found.spin_final.values - rows["spin_400"]), found.spin_error.values
     sharp = rows["uncertainty_400"] < tolerance / 10
-    silent = sharp & (told <= tolerance)
+    silent = sharp & (estimated <= tolerance)
     assert silent.sum() > 0.95 * sharp.sum()
     assert np.mean(error[silent] <= tolerance) > 0.98
     # At 1e-10 one is off by 3.1 of it: its error has an extremum between the two runs (docs/explanation/accuracy.md).
     assert (error[silent] <= 3 * tolerance).sum() >= silent.sum() - 1
     assert np.all(error[silent] <= 4 * tolerance)
-    ratio = (told / error)[sharp & (error > 1e-3 * tolerance) & np.isfinite(told)]
+    ratio = (estimated / error)[sharp & (error > 1e-3 * tolerance) & np.isfinite(estimated)]
     assert 1 / 3 < np.median(ratio) < 3
     assert np.mean(ratio < 0.1) < 0.01
 

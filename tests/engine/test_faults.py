@@ -99,7 +99,7 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def moments(watch: Watch) -> dict[str, Callable[[], bool]]:
-    """When to strike, told from the names of the files."""
+    """When to strike, recognised by the names of the files."""
 
     def images() -> int:
         try:

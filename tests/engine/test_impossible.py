@@ -96,7 +96,7 @@ def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_pa
     assert found.attrs["impossible"] == edge.attrs["impossible"]
 
 
-def test_parts_of_a_run_tell_what_there_is(edge: xr.Dataset) -> None:
+def test_parts_of_a_run_know_what_they_hold(edge: xr.Dataset) -> None:
     """Even if no body of them can be."""
     part = edge.sel(b=0.9, offset=[1.0])
     assert "2 impossible" in describe(part)
@@ -107,9 +107,9 @@ def test_an_estimate_of_cells_none_of_which_can_be() -> None:
     """So it seems of a large table of which the sample meets no other."""
     offsets = np.ones(10_000)
     offsets[1] = 0.0
-    told = estimate(load_config({"cases": {"offset": offsets}, "body": {"delta": 0.03}, "friction": {"mu": 60}}))
-    assert "cells:  10000" in told
-    assert "steps:  0 if" in told
+    said = estimate(load_config({"cases": {"offset": offsets}, "body": {"delta": 0.03}, "friction": {"mu": 60}}))
+    assert "cells:  10000" in said
+    assert "steps:  0 if" in said
 
 
 def test_critical_spins_of_the_others(write: Write) -> None:

@@ -52,7 +52,7 @@ def test_the_pendulum_swings_as_scipy_says(few: xr.Dataset, folder: Path) -> Non
     assert cell["reversals"].item() == one["reversals"].item() > 5
 
 
-def test_its_dataset_tells_the_file_its_hash_and_its_parameters(few: xr.Dataset, folder: Path) -> None:
+def test_its_dataset_names_the_file_its_hash_and_its_parameters(few: xr.Dataset, folder: Path) -> None:
     assert few.attrs["model_place"] == str(folder / "pendulum.py")
     assert few.attrs["model_sha256"] == load_config(folder / "pendulum.yaml").origin.digest
     assert few["torque"].attrs == {"long_name": "torque of the drive", "units": "m g length"}
@@ -165,7 +165,9 @@ def test_an_error_in_a_worker_names_its_line(folder: Path, threaded: distributed
     ],
     ids=["helper", "law"],
 )  # fmt: skip
-def test_what_does_not_compile_is_told_with_its_line(folder: Path, file: str, old: str, new: str, message: str) -> None:
+def test_what_does_not_compile_is_reported_with_its_line(
+    folder: Path, file: str, old: str, new: str, message: str
+) -> None:
     text = own.SHOWN[f"{file}.py"].replace(old, new, 1) + "\n\ndef half(x):\n    return x\n"
     (folder / f"{file}.py").write_text(text, encoding="utf-8")
     line = text[: text.index(new)].count("\n") + 1

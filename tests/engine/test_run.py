@@ -155,9 +155,9 @@ def test_progress_counts_the_work_of_cells_whose_companions_run_beside_first_run
 
     with threads(1):
         life.live([each], look)
-    work, told = np.array(shares).T
+    work, reported = np.array(shares).T
     work /= sum(counted)
     assert len(work) > 20
-    assert told[-1] == pytest.approx(1.0)
-    assert np.abs(told - work)[work > 0.5].max() < 0.1
+    assert reported[-1] == pytest.approx(1.0)
+    assert np.abs(reported - work)[work > 0.5].max() < 0.1
     assert any(beside)

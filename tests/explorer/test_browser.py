@@ -306,15 +306,15 @@ def test_boundaries_have_their_counts(clicked: Page, counts: np.ndarray) -> None
     wait(clicked, "map figure", f"!{NUMBERS}.count.length")
 
 
-def test_the_pointer_tells_all_of_a_cell(clicked: Page, opened: xr.Dataset) -> None:
+def test_the_pointer_shows_all_of_a_cell(clicked: Page, opened: xr.Dataset) -> None:
     near = tip(clicked, 2, 0)
     clicked.locator("#cell").get_by_text("μ = 60, b = 2, n₀ = 0.05").wait_for()
-    told = text(clicked, "cell")
+    shown = text(clicked, "cell")
     cell = opened.isel(mu=2, b=0, n0=N0)
-    assert "lower bound" in told
+    assert "lower bound" in shown
     for name in ("spin_final", "t_stop", "n_c1_linear", "form_factor", "energy_error"):
-        assert ", ".join(labels.number(value) for value in cell[name].sortby([*cell[name].dims]).values.flat) in told
-    assert "ended at the time limit" in told
+        assert ", ".join(labels.number(value) for value in cell[name].sortby([*cell[name].dims]).values.flat) in shown
+    assert "ended at the time limit" in shown
     assert near.strip() == f"spin reversals, simulated: {int(cell['reversals'])}"
     select(clicked, "show", "how the trajectory ended", "show=status")
     assert tip(clicked, 2, 0).strip() == "how the trajectory ended: ended at the time limit"
@@ -400,7 +400,7 @@ def test_an_axis_of_one_value_has_no_slider(opened: xr.Dataset, values: int, cap
     assert not caplog.records
 
 
-def test_no_cell_is_told_along_other_axes(opened: xr.Dataset) -> None:
+def test_no_cell_is_shown_along_other_axes(opened: xr.Dataset) -> None:
     """Until the pointer is on one: its indices were those of the old axes."""
     document, _ = document_of(opened, x="mu", y="b")
     cell = document.get_model_by_name("cell")
@@ -519,7 +519,7 @@ def test_a_link_reopens_the_page(page: Page, visit: Open) -> None:
     assert (other.url, curves(other), image(other)) == (link, curves(page), image(page))
 
 
-def test_a_wrong_link_is_told_and_harmless(visit: Open) -> None:
+def test_a_wrong_link_is_reported_and_harmless(visit: Open) -> None:
     page = visit("show=<img src=x onerror=alert(1)>&n0=9&cell=mu:-3&file=/etc/passwd")
     said = text(page, "notice")
     for words in ("<img src=x onerror=alert(1)> is not", "n0=9 is not", "cell=mu:-3", "unknown URL parameter 'file'"):

@@ -60,7 +60,7 @@ def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, 
 
 
 def test_no_other_code_is_run(source: Source, folder: Path, tiny: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither another file, nor what is not there, nor the right one beside a dataset that tells no hash."""
+    """Neither another file, nor what is not there, nor the right one beside a dataset without a hash."""
     monkeypatch.setattr("sweep.models.user.loading.load", lambda origin: pytest.fail(f"ran {origin.place}"))
     (folder / "other.py").write_text(PENDULUM.replace("2 / 3", "3 / 4"), encoding="utf-8")
     bare = Source(source.dataset.drop_attrs(deep=False).assign_attrs(config=source.dataset.attrs["config"]), "bare.nc")

@@ -31,7 +31,7 @@ def whole(setup: Setup, cell: Cell) -> Curve:
 
 
 class Heard(Job):
-    """A job that remembers what it was delayed by when it told news, and can be waited for."""
+    """A job that remembers what it was delayed by when it had news, and can be waited for."""
 
     def __init__(self, cell: Cell) -> None:
         super().__init__(cell, self._hear)
@@ -87,12 +87,12 @@ def test_a_curve_ends_with_the_steps_and_samples_of_a_long_one(setup: Setup, mon
 
 def test_short_stretches_go_first(setup: Setup) -> None:
     """A cell that is added is seen before those before it are run to their ends."""
-    told = list[tuple[float, bool]]()
+    news = list[tuple[float, bool]]()
 
     class Noting(Heard):
         def _hear(self, job: Job) -> None:
             if job.curve:
-                told.append((job.cell["mu"], job.curve.whole))
+                news.append((job.cell["mu"], job.curve.whole))
             super()._hear(job)
 
     running = Runner(setup)
@@ -101,10 +101,10 @@ def test_short_stretches_go_first(setup: Setup) -> None:
         running.submit(job)
     for job in jobs:
         job.wait()
-    assert told.index((70.0, False)) < told.index((60.0, True))
+    assert news.index((70.0, False)) < news.index((60.0, True))
 
 
-def test_what_cannot_be_run_is_told(setup: Setup) -> None:
+def test_what_cannot_be_run_is_reported(setup: Setup) -> None:
     job = Heard({**setup.base, "x0": 50.0})
     Runner(setup).submit(job)
     assert "x0" in job.wait().fault

@@ -1,4 +1,4 @@
-"""Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is told of a cell."""
+"""Slices of a dataset: the same numbers as xarray's own selection, whatever the axes, and what is shown of a cell."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -52,18 +52,18 @@ def test_cells_end_half_way_between_values(spacing: str, values: list[float], ed
     np.testing.assert_array_equal(axis.place(values), [0, 1, 2] if spacing == "uneven" else values)
 
 
-def test_a_cell_is_told_in_words(source: Source, opened: xr.Dataset) -> None:
-    told = [source.values_at({"mu": k, "b": 0, "n0": 1}) for k in range(4)]
-    ends = [each["how the trajectory ended"] for each in told]
+def test_a_cell_is_described_in_words(source: Source, opened: xr.Dataset) -> None:
+    shown = [source.values_at({"mu": k, "b": 0, "n0": 1}) for k in range(4)]
+    ends = [each["how the trajectory ended"] for each in shown]
     assert ends == ["lifted off the table", "settled", "ended at the time limit", "settled"]
-    assert "note" not in told[1]
-    assert "lower bound" in told[2]["note"]
-    assert "round-off" in told[3]["note"]
+    assert "note" not in shown[1]
+    assert "lower bound" in shown[2]["note"]
+    assert "round-off" in shown[3]["note"]
     cell = opened.isel(mu=1, b=0, n0=1)
-    assert told[1]["spin reversals, simulated"] == str(int(cell["reversals"]))
-    assert told[1]["time of the end"] == f"{float(cell['t_stop']):.6g} √(c/g)"
+    assert shown[1]["spin reversals, simulated"] == str(int(cell["reversals"]))
+    assert shown[1]["time of the end"] == f"{float(cell['t_stop']):.6g} √(c/g)"
     assert source.meanings["time of the end"] == opened["t_stop"].attrs["description"] != ""
-    assert len(told[1]) == len([n for n, v in opened.data_vars.items() if v.dims]) + 1
+    assert len(shown[1]) == len([n for n, v in opened.data_vars.items() if v.dims]) + 1
 
 
 def test_a_large_dataset_is_read_slice_by_slice(tiny: Path, monkeypatch: pytest.MonkeyPatch) -> None:

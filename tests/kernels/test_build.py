@@ -102,18 +102,18 @@ def test_no_more_processes_at_once_than_threads(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
-    told: list[object] = []
+    shown: list[object] = []
 
     @contextmanager
     def show() -> Iterator[None]:
-        told.append("begins")
+        shown.append("begins")
         yield
-        told.append(len(started))
+        shown.append(len(started))
 
     with showing(show):
         build([kernel()])
     build([kernel()])
-    assert told == ["begins", 2]
+    assert shown == ["begins", 2]
 
 
 def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -157,13 +157,13 @@ def test_processes_end_with_the_one_that_started_them(
             time.sleep(0.01)
         process.send_signal(with_signal)
         assert process.stderr
-        told = process.stderr.read().splitlines()
+        shown = process.stderr.read().splitlines()
         assert process.wait() == code
     assert not psutil.wait_procs(children, timeout=60)[1]
     assert list((tmp_path / "cache").rglob("*.nbc")) == []  # they were ended, and have not come to their ends
-    assert len(told) == (2 if with_signal == signal.SIGINT else 1), told
-    assert told[0].startswith("compiling")
-    assert told[1:] == ["interrupted: no cells finished and kept; the same command resumes the run"][: len(told) - 1]
+    assert len(shown) == (2 if with_signal == signal.SIGINT else 1), shown
+    assert shown[0].startswith("compiling")
+    assert shown[1:] == ["interrupted: no cells finished and kept; the same command resumes the run"][: len(shown) - 1]
 
 
 @pytest.mark.campaign

@@ -90,10 +90,10 @@ def test_the_stiff_method_takes_any_body_with_viscous_friction() -> None:
         "integrator": {"t_end": 1.5, "stop_early": False},
     }  # fmt: skip
     stiff, plain, chosen = (sweep.run(scene, **method) for method in ({"method": "adams"}, {"method": "dopri5"}, {}))
-    told, apart = stiff["spin_error"] + plain["spin_error"], abs(stiff["spin_final"] - plain["spin_final"])
+    estimated, apart = stiff["spin_error"] + plain["spin_error"], abs(stiff["spin_final"] - plain["spin_final"])
     assert float(apart.max()) < 1e-8 * UNIT
-    assert float(told.max()) < 3e-8 * UNIT  # one of four is told by its rattle, three times too large
-    assert bool((apart < 10 * told).all())
+    assert float(estimated.max()) < 3e-8 * UNIT  # one of four is estimated from its rattle, three times too large
+    assert bool((apart < 10 * estimated).all())
     np.testing.assert_array_equal(stiff["reversals"], plain["reversals"])
     assert float(stiff["energy_error"].max()) < 1e-6
     assert (stiff["step"] > 3 * plain["step"]).sel(mu=1000).all()

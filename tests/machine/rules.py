@@ -77,7 +77,7 @@ class Scene:
 
     @property
     def features(self) -> Features:
-        """What tells it from others."""
+        """What distinguishes it from others."""
         return features(draws.shipped()["paper"], self.flat) | {self.config.tier.name, f"{len(self.config.axes)} axes"}
 
     def with_(self, changes: Flat, *without: str) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from sweep.plots import animation, body
 
 
 def turning(bodies: int = 1, **given: float) -> xr.Dataset:
-    """Bodies that lean, turn and travel as `sweep.trajectory` tells it."""
+    """Bodies that lean, turn and travel as `sweep.trajectory` computes it."""
     time = np.linspace(0, 10, 101)
     motion = {
         "spin": 0.3 - 0.0601 * time, "ripple_free_spin": 0.3 - 0.0601 * time, "heading": 0.3 * time - 0.03 * time**2,
@@ -66,7 +66,7 @@ def test_a_clip_lasts_as_asked_and_moves(tmp_path: Path) -> None:
 
 
 def test_ffmpeg_is_given_all_frames_of_a_film(tmp_path: Path) -> None:
-    """A stand-in for ffmpeg, which not every machine has, writes down what it is told and how much it is given."""
+    """A stand-in for ffmpeg, which not every machine has, writes down its arguments and how much it is given."""
     program = tmp_path / "ffmpeg"
     program.write_text(
         f"#!{sys.executable}\nimport sys\nfrom pathlib import Path\n"
@@ -75,11 +75,11 @@ def test_ffmpeg_is_given_all_frames_of_a_film(tmp_path: Path) -> None:
     program.chmod(0o755)
     with mpl.rc_context({"animation.ffmpeg_path": str(program)}):
         animation.animate(turning(3), tmp_path / "clip.mp4", begin=2, end=4, speed=10)
-    told = (tmp_path / "clip.mp4").read_text().split()
-    width, height = map(int, told[told.index("-s") + 1].split("x"))
+    given = (tmp_path / "clip.mp4").read_text().split()
+    width, height = map(int, given[given.index("-s") + 1].split("x"))
     assert (width % 2, height % 2) == (0, 0)  # or its usual codec refuses them
-    assert told[told.index("-framerate") + 1] == "20"
-    assert int(told[-1]) == 5 * width * height * 4
+    assert given[given.index("-framerate") + 1] == "20"
+    assert int(given[-1]) == 5 * width * height * 4
 
 
 def test_the_first_reversal_is_in_the_middle_of_the_clip() -> None:

@@ -43,7 +43,7 @@ def test_the_kinds_of_a_count(cells: xr.Dataset) -> None:
     assert list(kinds) == list(WORDS)
 
 
-def test_a_prediction_cannot_fail_and_a_status_tells_itself(cells: xr.Dataset) -> None:
+def test_predictions_and_statuses_have_no_marks_of_failure(cells: xr.Dataset) -> None:
     for name in ("reversals_predicted", "status"):
         assert not any(where.any() for where in marks(cells, name).values())
 

@@ -1,4 +1,4 @@
-"""What the pictures of a dataset contain, told by the artists of the figures."""
+"""What the pictures of a dataset contain, read from the artists of the figures."""
 
 import tracemalloc
 from pathlib import Path
@@ -106,7 +106,7 @@ def test_a_difference_is_coloured_evenly_about_zero() -> None:
     assert norm.boundaries[-1] > 7
 
 
-def test_the_lightness_of_colours_tells_values_apart() -> None:
+def test_colours_of_different_values_differ_in_lightness() -> None:
     counts, differences = np.arange(18), np.arange(-10, 11)
     for name in (scales.SEQUENTIAL, "cividis"):
         assert (np.diff(scales.counts(counts, name=name).lightness(counts)) > 0.01).all()
@@ -115,7 +115,7 @@ def test_the_lightness_of_colours_tells_values_apart() -> None:
 
 
 @pytest.mark.parametrize("top", [1, 6, 16, 30, 33, 41, 60, 207, 3000])
-def test_every_count_has_a_colour_and_high_ones_are_told_apart(top: int) -> None:
+def test_every_count_has_a_colour_and_high_ones_differ(top: int) -> None:
     scale = scales.counts(np.arange(top + 1))
     assert isinstance(scale.norm, BoundaryNorm)
     assert scale.norm.boundaries[0] == -0.5
@@ -207,7 +207,7 @@ def test_theory_is_drawn_over_reversals_alone() -> None:
     assert any("largest form factor L(f)" in text for text in entries(picture.plot(made())))
 
 
-def test_a_status_is_told_in_words() -> None:
+def test_a_status_is_written_in_words() -> None:
     figure = picture.plot(made(), "status")
     assert entries(figure) == ["settled (79)", "ended at the time limit (1)"]
     assert len(figure.axes) == 1  # and no bar with numbers
@@ -311,7 +311,7 @@ def test_limits_may_be_numbers_of_numpy() -> None:
     assert mesh(maps(given)[0]).get_clim() == mesh(maps(plain)[0]).get_clim()
 
 
-def test_curves_tell_lower_bounds_and_crossings() -> None:
+def test_curves_mark_lower_bounds_and_crossings() -> None:
     figure = picture.plot(made(b=[2, 3, 4, 5], n0=[0.02]).isel(b=3, n0=0))
     (axes,) = figure.axes
     at = {line.get_gid(): line.get_xdata()[0] for line in axes.lines if line.get_label().startswith("_")}

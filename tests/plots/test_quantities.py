@@ -119,11 +119,11 @@ def test_a_later_reversal_is_not_taken_for_the_first(whole: xr.Dataset) -> None:
     assert "ratio" not in derivable(whole.isel(reversal=1))
 
 
-def test_the_explorer_tells_of_a_cell_what_is_derived(whole: xr.Dataset) -> None:
+def test_the_explorer_shows_derived_quantities_of_a_cell(whole: xr.Dataset) -> None:
     source = Source(whole)
-    told = source.values_at({"n0": 1, "delta": 1})
-    assert told["first reversal, simulated / predicted"] == "1.25"
-    assert told["simulated − predicted"] == "+2"
+    shown = source.values_at({"n0": 1, "delta": 1})
+    assert shown["first reversal, simulated / predicted"] == "1.25"
+    assert shown["simulated − predicted"] == "+2"
     assert source.map("ratio", "delta", "n0", {}).legend["failed"] == "failed: 1 lifted off the table (1)"
 
 
@@ -236,7 +236,7 @@ def test_pictures_of_a_file_are_set_aside_where_something_else_is_measured() -> 
     assert load_config(asked, {"mu": [20, 70]}).picture == ("energy_error",)
 
 
-def test_a_picture_that_cannot_be_drawn_is_told_and_the_others_are_pictures(tmp_path: Path, write: Write) -> None:
+def test_a_picture_that_cannot_be_drawn_is_reported_and_the_others_are_drawn(tmp_path: Path, write: Write) -> None:
     file = write(f"{FORMULA}picture: [probability, status]\n", "map.yaml")
     result = invoke("run", file, "--output", tmp_path / "out")
     assert result.exit_code == 0

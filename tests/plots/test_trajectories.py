@@ -44,7 +44,7 @@ def test_every_curve_is_in_a_legend() -> None:
         lines = [line for line in axes.lines if line.get_gid() in ("spin", *SERIES)]
         assert lines
         assert all(line.get_color() == colours[line.get_label()] for line in lines)
-        # Where a panel has several series, its own legend tells them apart by their shade.
+        # Where a panel has several series, its own legend distinguishes them by their shade.
         shades = {line.get_alpha() for line in lines}
         if len({line.get_gid() for line in lines}) > 1:
             assert {handle.get_alpha() for handle in axes.get_legend().legend_handles} == shades
@@ -124,7 +124,7 @@ def test_a_column_shows_the_spin_alone() -> None:
     assert figure.get_figheight() * 25.4 < 130
 
 
-def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
+def output_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
     """The file that a command writes, of which `plot` draws the same picture, and what `info` says of it."""
     file = config.with_name(f"small_{verb}.nc")
     assert invoke(verb, config, *options, "--output", config.parent).exit_code == 0
@@ -137,17 +137,17 @@ def told_of(verb: str, config: Path, *options: str) -> tuple[Path, str]:
 
 
 def test_plot_and_info_know_the_file_of_a_trajectory(write: Write) -> None:
-    file, told = told_of("trajectory", write(), "--at", "mu=60", "--at", "mu=75", "--set", "t_end=50")
-    assert "2 trajectories" in told
-    assert "mu = 75, n0 = 0.02, x0 = 0.01, y0 = 0.01: time_limit at t = 50, 0 reversals" in told
+    file, printed = output_of("trajectory", write(), "--at", "mu=60", "--at", "mu=75", "--set", "t_end=50")
+    assert "2 trajectories" in printed
+    assert "mu = 75, n0 = 0.02, x0 = 0.01, y0 = 0.01: time_limit at t = 50, 0 reversals" in printed
     refused(invoke("plot", file, "--x", "mu"), "not for a figure of single trajectories")
 
 
 def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
     settings = ("--set", "b=3", "--set", "mu=[0,60]", "--set", "n0=0.02", "--bracket", "0.1")
-    file, told = told_of("critical", write(), *settings)
-    assert "critical spins of 2 bodies (mu 2)" in told
-    assert "n_c1, positive spin: 1 no friction, 1 found; 0.0024" in told
+    file, printed = output_of("critical", write(), *settings)
+    assert "critical spins of 2 bodies (mu 2)" in printed
+    assert "n_c1, positive spin: 1 no friction, 1 found; 0.0024" in printed
     assert invoke("plot", file, "--variable", "n_c2_simulated").exit_code == 0
     figure = picture.plot(file)
     assert sum(line.get_gid() in VARIABLES for line in figure.axes[0].lines if line.get_gid()) == 8

@@ -108,7 +108,7 @@ def test_margins_are_those_of_cells_that_settle() -> None:
     same_numbers(endless, usual)
 
 
-def test_a_spin_that_comes_no_nearer_to_zero_tells_no_distance_from_the_next_count() -> None:
+def test_a_spin_that_comes_no_nearer_to_zero_gives_no_distance_to_the_next_count() -> None:
     """Cells of a line that count four, from where five begins (b = 7.7) to where three begins (b = 8)."""
     cells = sweep.run(SCENE, mu=121.74, b=np.linspace(7.5, 7.98, 33), progress=False).squeeze()
     counts = Counts.of({name: cells[name].values for name in description.MARGINS})
@@ -235,7 +235,7 @@ def test_pairs_that_are_not_searched_are_counted(tmp_path: Path) -> None:
     assert "not searched 5: " in said
 
 
-def test_a_picture_without_curves_tells_whether_counts_differ() -> None:
+def test_a_picture_without_curves_says_whether_counts_differ() -> None:
     early = sweep.boundaries({"friction": {"mu": [60, 70]}}, n0=[0.04, 0.06], t_end=1000)
     assert (early.sizes["point"], early.pairs_not_searched) == (0, 3)
     assert picture.plot(early).axes[0].get_title() == "no boundary was searched"

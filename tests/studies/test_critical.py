@@ -147,8 +147,8 @@ def test_n_c2_is_the_first_boundary_along_n0(write: Write) -> None:
 
 
 def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
-    told = invoke("critical", write(STANDARD), "--set", "mu=0", "--dry-run")
-    assert told.stdout == "bodies: 1 (one body), each with spins of both signs; none has an n_c1 from which to search\n"
+    dry = invoke("critical", write(STANDARD), "--set", "mu=0", "--dry-run")
+    assert dry.stdout == "bodies: 1 (one body), each with spins of both signs; none has an n_c1 from which to search\n"
     for settings, reason in (
         ({"mu": 0.0}, "no_friction"),
         ({"model": "noslip"}, "no_friction"),
@@ -163,7 +163,7 @@ def test_spins_that_are_not_critical_have_a_reason(write: Write) -> None:
 
 
 def test_friction_alone_makes_a_rattle_grow_at_a_fast_spin(write: Write) -> None:
-    """Without the angle δ nothing tells right from left, and nothing reverses, but upright spin is not stable."""
+    """Without the angle δ right and left are alike and nothing reverses, but upright spin is not stable."""
     spins = sweep.critical(write(STANDARD), delta=0.0, t_end=100.0, bracket=0.01)
     assert spins.n_c1_linear.values == pytest.approx([0.0798, -0.0798], rel=0.01)
     assert "exists" not in reasons(spins)

@@ -586,8 +586,8 @@ def random_film(random: np.random.Generator) -> tuple[dict[str, Any], Film, np.n
     start = {"n0": random.choice([-1, 1]) * random.uniform(1, 8)}
     start["x0"] = a * np.exp(random.uniform(np.log(0.004), np.log(0.1)))
     start["y0"] = b * np.exp(random.uniform(np.log(0.004), np.log(0.1))) * random.choice([-1, 1])
-    told = {"name": "film", "units": "SI", "body": solid, "friction": LAWS[law], "integrator": {"t_end": 100}}
-    columns = (config := sweep.load_config(told | {"friction": friction, "start": start})).grid.columns()
+    scene = {"name": "film", "units": "SI", "body": solid, "friction": LAWS[law], "integrator": {"t_end": 100}}
+    columns = (config := sweep.load_config(scene | {"friction": friction, "start": start})).grid.columns()
     times = np.arange(0, random.uniform(4, 8), 1 / random.choice([30, 60, 120, 240]))
     p = {name: float(value[0]) for name, value in columns.items()}
     # DOP853 took three times as many evaluations for most bodies, and minutes for stiff ones.
@@ -599,7 +599,7 @@ def random_film(random: np.random.Generator) -> tuple[dict[str, Any], Film, np.n
     exact = newton.spin(y) if what == "spin" else -y[4]
     value = exact + random.normal(0, abs(start["n0"]) * random.uniform(0.01, 0.05), len(times))
     guess = {"n0": 5.0, "x0": a / 50, "y0": b / 50}
-    return told | {"start": guess}, Film(times, value, what=what), exact
+    return scene | {"start": guess}, Film(times, value, what=what), exact
 
 
 @pytest.mark.release
@@ -608,8 +608,8 @@ def test_good_films_of_random_bodies_are_called_good_and_have_the_best_minimum()
     random, verdicts = np.random.default_rng(1), list[tuple[bool, bool]]()
     while len(verdicts) < 12:
         if filmed := random_film(random):
-            told, film, exact = filmed
-            found = sweep.fit(told, film, ["mu", "sigma", "n0", "x0", "y0"], progress=False)
+            scene, film, exact = filmed
+            found = sweep.fit(scene, film, ["mu", "sigma", "n0", "x0", "y0"], progress=False)
             kept = ~found["outlier"].values
             ours, true = (np.sum((curve - film.value)[kept] ** 2) for curve in (found["fitted"].values, exact))
             verdicts.append((found.attrs["fits"] == 1, bool(ours <= true)))

@@ -97,7 +97,7 @@ def test_a_finished_search_is_complete_and_another_is_refused(config: Path, tmp_
     assert invoke(*command, "--set", "n0=0.3", "--bracket", "0.01").exit_code == 0  # no critical spin depends on it
 
 
-def test_progress_is_told(config: Path) -> None:
+def test_progress_is_reported(config: Path) -> None:
     following = Heard()
     sweep.trajectory(config, at={"mu": [60, 75], "b": 3}, t_end=3000, progress=following)
     done = [progress.done for progress in following.seen]

@@ -56,11 +56,11 @@ def test_attitude_and_path_are_those_of_newton_and_euler(
     scene: dict[str, Any], law: str | None, t_end: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(own.write(tmp_path))  # where fading.py is
-    config, told = load_config(scene, {"t_end": t_end, "tolerance": 1e-12}), Heard()
+    config, heard = load_config(scene, {"t_end": t_end, "tolerance": 1e-12}), Heard()
     cell, model = config.grid.columns(), config.equations
     parameters = {"surface": scene["body"].get("surface")} | {name: float(v[0]) for name, v in cell.items()}
-    one = sweep.trajectory(config, every=t_end / 50, progress=told)
-    assert {progress.unit for progress in told.seen} == {"s" if "units" in scene else "sqrt(c/g)"}
+    one = sweep.trajectory(config, every=t_end / 50, progress=heard)
+    assert {progress.unit for progress in heard.seen} == {"s" if "units" in scene else "sqrt(c/g)"}
     assert one["energy_error"] < 1e-7
     assert one.attrs.get("surface") == parameters["surface"]
     if "x0" in parameters:

@@ -99,5 +99,5 @@ def lengthen(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
 
 
 def same_numbers(one: xr.Dataset, other: xr.Dataset) -> None:
-    """All but the attributes, where the time that it took is told."""
+    """All but the attributes, which hold the time that it took."""
     xr.testing.assert_identical(one.drop_attrs(deep=False), other.drop_attrs(deep=False))

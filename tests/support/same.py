@@ -1,4 +1,4 @@
-"""Whether two runs left the same files: byte for byte, but for what tells the time."""
+"""Whether two runs left the same files: byte for byte, apart from clocks."""
 
 import struct
 from pathlib import Path
@@ -14,7 +14,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def without_clock(path: Path) -> bytes:
-    """The bytes of a dataset, with those of the attributes that tell the time replaced."""
+    """The bytes of a dataset, with those of the attributes that hold a time replaced."""
     whole = path.read_bytes()
     with netCDF4.Dataset(path) as dataset:
         clock = [dataset.created.encode()]
