@@ -300,7 +300,7 @@ def test_a_dataset_does_not_run_the_code_of_another(tmp_path: Path) -> None:
 
 def test_a_configuration_can_be_read() -> None:
     config = load_config(SAID, {"b": [2, 3, 4]})
-    assert repr(config) == f"<Config quick>\n{config.to_yaml()}"
+    assert repr(config) == f"<Config quick>\n{config.label()}"
     shown = config._repr_html_()
     assert "<caption>quick: averaged</caption>" in shown
     assert "<th>b<td>2 … 4<td>3 values<td>short semi-axis b<td>c" in shown

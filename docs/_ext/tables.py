@@ -87,7 +87,7 @@ def _variables() -> tuple[Row, list[Row]]:
 def _doubts() -> tuple[Row, list[Row]]:
     rows = [
         (str(int(bit)), f"`{name}`", words, "yes" if bit in COUNT_DOUBTS else "no")
-        for bit, (name, words) in dataset.DOUBTS.items()
+        for bit, (name, words, _) in dataset.DOUBTS.items()
     ]
     return ("bit", "flag", "meaning", "against the count"), rows
 

@@ -39,16 +39,9 @@ def plot(
 
     interrupt.raise_again()
     # The picture drawn without options belongs to the run; any other gets its own name.
-    given = {name: f"{value:g}" if isinstance(value, float) else value for name, value in how.items()}
-    asked = [f"{name}={value}" for name, value in given.items() if value]
-    parts = [
-        file.stem,
-        variable,
-        *(f"{name}={value}" for name, value in at.items()),
-        *asked,
-        "" if title is None else f"title={title}",
-    ]
-    target = output or file.with_name(f"{'_'.join(filter(None, parts))}.png".replace("/", "-"))
+    options = {name: value for name, value in {**at, **how, "title": title}.items() if value is not None}
+    parts = [f"{name}={f'{value:g}' if isinstance(value, float) else value}" for name, value in options.items()]
+    target = output or file.with_name(f"{'_'.join(filter(None, [file.stem, variable, *parts]))}.png".replace("/", "-"))
     dataset = opened(file)
     picture.plot(dataset, variable, at=at, title=title, output=target, **how)
     for name, i in panels.nearest(dataset, at).items():

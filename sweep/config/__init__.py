@@ -67,9 +67,12 @@ def load_config(
     """
     if isinstance(config, Config) and not overrides:
         return config
-    source, origin = _opened(config, overrides or {}, argument, announce)
+    source, overrides = _source(config), overrides or {}
+    if "model" in overrides:  # on which the code to run depends
+        source.set(("model",), plain_data(overrides["model"]), argument("model"))
+    origin = user_models.named(source, announce)
     known = loading.table(origin)
-    for key, value in (overrides or {}).items():
+    for key, value in overrides.items():
         source.set(_full_path(key, known), plain_data(value), argument(key))
     # A name derived from the file name must not be refused, since the user did not choose it.
     stem = re.sub(r"[^A-Za-z0-9._-]", "_", Path(source.file).stem).lstrip("._-")[:100]
@@ -82,26 +85,6 @@ def load_config(
         found = explain(error.errors(), kind).items()
         raise InputError(source.fault(path, text, at_key=key) for path, (text, key) in found) from None
     return _resolve(values, source, origin)
-
-
-def parameters_of(config: ConfigLike, overrides: Mapping[str, Any]) -> Mapping[str, Parameter]:
-    """Return the parameters that a configuration with these overrides may name; raises as `load_config`."""
-    if isinstance(config, Config) and "model" not in overrides:
-        return config.table
-    return loading.table(_opened(config, overrides)[1])
-
-
-def _opened(
-    config: ConfigLike,
-    overrides: Mapping[str, Any],
-    argument: Callable[[str], str] = str,
-    announce: Callable[[str], None] | None = lambda message: None,  # noqa: ARG005
-) -> tuple[document.Document, Origin | None]:
-    """Open the document of a configuration, and load its model if it is user-defined."""
-    source = _source(config)
-    if "model" in overrides:  # on which the code to run depends
-        source.set(("model",), plain_data(overrides["model"]), argument("model"))
-    return source, user_models.named(source, announce)
 
 
 def _source(config: ConfigLike) -> document.Document:

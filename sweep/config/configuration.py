@@ -10,11 +10,9 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML
-from ruamel.yaml.compat import StringIO
 
 from sweep.config.distributions import Distribution
-from sweep.config.document import Document
+from sweep.config.document import Document, dump
 from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.faults import InputError, Path
@@ -214,10 +212,6 @@ class Config:
             "max_failed_fraction": self.max_failed_fraction,
         }
 
-    def to_yaml(self) -> str:
-        """Return the whole configuration as the text of a YAML file."""
-        return _yaml(self.document())
-
     def label(self) -> str:
         """Return the configuration as YAML, without the columns of a table of cases that it gives itself.
 
@@ -226,7 +220,7 @@ class Config:
         found = self.document()
         if isinstance(found.get("cases"), dict):
             found["cases"] = "coordinates of the dimension case"
-        return _yaml(found)
+        return dump(found)
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the numbers, unlike the name or the pictures."""
@@ -237,11 +231,3 @@ class Config:
         digest = [self.origin.digest] if self.origin else []
         text = json.dumps([decisive, list(self.axes), self.cases or None, *digest], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _yaml(document: Mapping[str, Any]) -> str:
-    stream = StringIO()
-    yaml = YAML(typ="safe", pure=True)
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    yaml.dump(document, stream)
-    return stream.getvalue()

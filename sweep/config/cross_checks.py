@@ -74,6 +74,9 @@ def of_all_cells(config: Config) -> Iterator[Misfit]:
 
 def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
     model, columns = config.tier, config.cases
+    listed = {} if config.samples else columns
+    for name in [name for name in listed if name not in model.parameters]:
+        yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"
     for name, value in given.items():
         path = config.table[name].place
         # A parameter that the model does not use may stay, so that one file serves every model.
@@ -87,15 +90,13 @@ def _of_parameters(config: Config, given: Mapping[str, Values]) -> Iterator[Misf
         elif config.samples and (beyond := [n for n in columns.get(name, ()) if not config.table[name].allows(n)]):
             message = f"{len(beyond)} of {len(columns[name])} samples are like {beyond[0]:.4g}"
             yield path, f"must be {config.table[name].allowed}, but {message}; choose another distribution"
-        if name in model.positive and (small := min(value.numbers, default=1.0)) < _LEAST:
-            yield path, f"must be at least {_LEAST:g} for the {model.name} model, not {small:g}"
     if config.samples and not config.distributions:
         yield ("samples",), "needs a parameter that is a distribution, such as n0: {normal: [0.05, 0.002]}"
-    for name, column in () if config.samples else columns.items():
-        if name not in model.parameters:
-            yield ("cases",), f"column {name}: the {model.name} model has no {name}; remove it"
-        elif name in model.positive and (small := min(column, default=1.0)) < _LEAST:
-            yield ("cases",), f"column {name}: must be at least {_LEAST:g} for the {model.name} model, not {small:g}"
+    numbers = {config.table[name].place: value.numbers for name, value in given.items() if name in model.positive}
+    numbers |= {("cases", name): listed[name] for name in model.positive if name in listed}
+    for path, values in numbers.items():
+        if (small := min(values)) < _LEAST:
+            yield path, f"must be at least {_LEAST:g} for the {model.name} model, not {small:g}"
     for name in model.parameters:
         if name not in config.parameters and name not in columns:
             yield config.table[name].place, f"missing; give {config.table[name].allowed}"

@@ -12,6 +12,7 @@ from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
+from io import StringIO
 from itertools import accumulate, pairwise
 from math import inf, nan
 from pathlib import Path as FilePath
@@ -112,12 +113,10 @@ def plain_data(value: Any) -> Any:
         return [plain_data(item) for item in value]
     if hasattr(value, "columns") and hasattr(value, "to_dict"):  # a pandas DataFrame
         return plain_data(value.to_dict("list"))
-    if isinstance(value, timedelta):
-        return _with_unit(value.total_seconds(), "s")
-    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    kind = "m" if isinstance(value, timedelta) else getattr(getattr(value, "dtype", None), "kind", "")
     if kind == "m":
-        return _with_unit((np.asarray(value) / np.timedelta64(1, "s")).tolist(), "s")
-    if kind == "M":
+        return _with_unit((np.asarray(value, "m8") / np.timedelta64(1, "s")).tolist(), "s")
+    if kind == "M":  # whose numbers are nanoseconds since 1970
         return np.asarray(value).astype(str).tolist()
     if hasattr(value, "magnitude") and hasattr(value, "units"):  # of Pint
         return _with_unit(plain_data(value.magnitude), f"{value.units:~C}")
@@ -126,10 +125,8 @@ def plain_data(value: Any) -> Any:
     if isinstance(attributes := getattr(value, "attrs", None), Mapping):
         inside = value.data if hasattr(value, "data") else np.asarray(value)  # xarray may hold quantities
         return _with_unit(plain_data(inside), attributes.get("units", ""))
-    if isinstance(value, np.ma.MaskedArray):
-        return value.tolist()
     if hasattr(value, "__array__"):
-        return np.asarray(value).tolist()
+        return np.ma.asarray(value).tolist()
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
@@ -149,6 +146,15 @@ def read(path: FilePath) -> Document:
     document = Document(str(path))
     document.values = _values(node, document)
     return document
+
+
+def dump(values: Mapping[str, Any]) -> str:
+    """Return plain values as the text of a YAML file, in their order."""
+    stream = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.dump(values, stream)
+    return stream.getvalue()
 
 
 def parse_value(text: str, source: str) -> Any:

@@ -21,27 +21,13 @@ from sweep.units import ANGLE, SPIN, TIME, Unit, factor
 MOST_ROWS = 20_000
 """Most rows of a film; a longer film is thinned evenly, since more rows add time and hardly any information."""
 
-# Column names of trackers and phones, without the unit in parentheses: Sensor Logger `seconds_elapsed` and `z` (its
-# `time` counts nanoseconds since 1970), SensorLog `motionRotationRateZ`, Physics Toolbox `wz`, Tracker `ω`, `θ` and
-# `θr`. The first match counts.
+# Patterns of the column names of trackers and phones, without the unit in parentheses: Sensor Logger `seconds_elapsed`
+# and `z` (its `time` counts nanoseconds since 1970), SensorLog `motionRotationRateZ`, Physics Toolbox `wz`, and
+# Tracker `ω`, `θ` and `θr`. The first match counts.
 _NAMES: dict[str, tuple[str, ...]] = {
     "time": ("seconds elapsed", "time", "t"),
     "spin": ("spin", "n", "angular velocity", "omega", "ω"),
-    "gyroscope": (
-        "gyroscope z",
-        "gyro z",
-        "gyr z",
-        "rotation rate z",
-        "motion rotation rate z",
-        "gyro rotation z",
-        "omega z",
-        "gyroz",
-        "gyrz",
-        "gz",
-        "wz",
-        "ωz",
-        "ω z",
-    ),
+    "gyroscope": ("(gyroscope|gyro rotation|(motion )?rotation rate|omega) z", "(gyro|gyr|ω) ?z", "[gw]z"),
     "heading": ("heading", "angle", "theta", "θ", "θr"),
     "error": ("error", "sigma", "uncertainty"),
 }
@@ -139,10 +125,10 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
 def _columns(table: Table) -> dict[str, int]:
     """Return the index of each known column, found by its name or else by its unit."""
     plain = [_plain(name) for name in table.names]
-    found = {
-        what: min((plain.index(name) for name in known if name in plain), key=lambda place: known.index(plain[place]))
-        for what, known in _NAMES.items() if {*known} & {*plain}
-    }  # fmt: skip
+    found = {}
+    for what, known in _NAMES.items():
+        if places := [i for pattern in known for i, name in enumerate(plain) if re.fullmatch(pattern, name)]:
+            found[what] = places[0]
     clocks = [place for place, unit in enumerate(table.units) if factor(unit, TIME)]
     upright = [place for place, name in enumerate(plain) if _UPRIGHT.fullmatch(name) and _turns(table, place)]
     if "time" not in found and clocks:
@@ -178,7 +164,7 @@ def _asked(table: Table, time_column: str, spin_column: str) -> dict[str, int]:
 def _kind(name: str, unit: str) -> str:
     """Return what a column shows, by its name, or else by its unit."""
     usual = "heading" if factor(unit, ANGLE) else "gyroscope" if _UPRIGHT.fullmatch(name) else "spin"
-    return next((what for what in get_args(Seen) if name in _NAMES[what]), usual)
+    return next((what for what in get_args(Seen) if re.fullmatch("|".join(_NAMES[what]), name)), usual)
 
 
 def _plain(name: str) -> str:

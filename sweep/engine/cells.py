@@ -31,7 +31,8 @@ ERRORS = (
 """What the last companion showed (`sweep.engine.errors.Errors`)."""
 
 NOTES = Layout((
-    "stage", "leg", "wary", "step", "step_rule", "halvings", "step_before", *MET, "repeats", "most_error", *ERRORS,
+    "stage", "leg", "wary", "step", "step_rule", "halvings", "step_before", *MET, "repeats", "most_error", "missed",
+    *ERRORS,
 ))  # fmt: skip
 """The notes on each cell. `leg` and `wary` belong to `sweep.engine.ending`; `halvings`, `step_before` and what was met
 belong to `sweep.engine.failures`; the others belong to `sweep.engine.errors`."""

@@ -39,7 +39,7 @@ from sweep.kernels.measures.margin import last_arc
 from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import ends_as_predicted
 from sweep.kernels.measures.reversals import Reversals
-from sweep.kernels.method import MISSED, REPEAT
+from sweep.kernels.method import REPEAT
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import COUNT_DOUBTS, FAILURES, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.model import stack
@@ -123,7 +123,7 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     """Estimate the errors of the cells `rows`, whose companions have ended; those above the tolerance run again.
 
     A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, at most `ROUNDS` times,
-    until the error is below `AIM` times the tolerance.  A cell whose error stays above the tolerance is `MISSED`.
+    until the error is below `AIM` times the tolerance.  A cell whose error stays above the tolerance has `missed` it.
 
     Returns
     -------
@@ -142,8 +142,7 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     known = ~limited_by_round_off(now)
     again = (large | by_chance) & known & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
     if not rules.fixed:
-        missed = rows[~again & (errors.reported > limit) & known]
-        notes["step_rule"][missed] = MISSED
+        notes["missed"][rows] = ~again & ((errors.reported > limit) & known | (notes["missed"][rows] > 0))
     lives.cells.images[rows] = now.images
     lives.note(rows, ERRORS, stack(errors).T)
     on = rows[again]
@@ -278,11 +277,13 @@ def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
 def _estimated(job: Plan, lives: Sequence[Lives], found: dict[str, Array]) -> dict[Doubt, Array]:
     """Add the errors of cells that were run twice to `found`; return which cells they give reason to doubt."""
     errors = Errors(*np.full((len(Errors._fields), len(found["status"])), np.nan))
+    missed = np.zeros(len(found["status"]), bool)
     for each in lives:
         for whole, part in zip(errors, errors_of(each), strict=True):
             whole[each.cells.cells] = part
+        missed[each.cells.cells] = each.notes["missed"]
     found["spin_error"] = np.where(found["doubts"] & Doubt.ROUND_OFF, np.nan, errors.reported)
-    against = {Doubt.TOLERANCE: found["step_rule"] == MISSED}
+    against = {Doubt.TOLERANCE: missed}
     if "reversals" in found:
         against[Doubt.STEP] = errors.reversals != found["reversals"]  # a failed companion has the count NaN
     if "margin_more" in found:

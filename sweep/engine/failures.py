@@ -22,7 +22,7 @@ from sweep.kernels.build import APPROACH as COMPILED
 from sweep.kernels.build import build
 from sweep.kernels.failure import approach
 from sweep.kernels.kernel import FAILURE
-from sweep.kernels.method import MISSED, REPEAT
+from sweep.kernels.method import REPEAT
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import DIVERGED, FAILURES, RUNNING
 from sweep.models.model import stack, take
@@ -161,8 +161,9 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
     _set_true(lives, here, images, take(met, over), take(before, over), true[over])
     notes["step"][here] = step
     if not rules.fixed:
-        rule = np.where(doubtful[over], MISSED, REPEAT)
-        notes["step_rule"][here] = np.where((halvings[over] > 0) | doubtful[over], rule, notes["step_rule"][here])
+        repeated = halvings[over] > 0
+        notes["step_rule"][here[repeated]] = REPEAT
+        notes["missed"][here] = doubtful[over] | (~repeated & (notes["missed"][here] > 0))
     _halve(lives, rows[~over], take(met, ~over))
     return np.asarray(here)
 

@@ -36,8 +36,8 @@ TOLERANCE = 1e-8
 Tolerance = float | Array
 """One for all cells, or one for each, shape (cells,)."""
 
-FIXED, ACCURACY, STABILITY, REPEAT, MISSED = range(5)
-STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability", REPEAT: "repeat", MISSED: "missed"}
+FIXED, ACCURACY, STABILITY, REPEAT = range(4)
+STEP_RULES = {FIXED: "fixed", ACCURACY: "accuracy", STABILITY: "stability", REPEAT: "repeat"}
 """Names of the rules that determine a step: the configuration; the tolerance; the stability limit of the method; a
 longer step failed or missed the tolerance; this step missed it too, but no shorter one was tried."""
 

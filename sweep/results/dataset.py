@@ -51,19 +51,19 @@ class Reason(IntEnum):
 REASONS = {int(reason): reason.name.lower() for reason in Reason}
 """The flags of variables that hold a `Reason`."""
 
+_FINER, _LOOK = "lower the tolerance", "look at the trajectory"
 DOUBTS = {
-    Doubt.TIME_LIMIT: ("not_final", "the time limit came first, so more reversals may follow."),
-    Doubt.STEP: ("depends_on_step", "longer steps give a different number of reversals."),
-    Doubt.WINDOWS: ("depends_on_windows", "averages over other windows give a different number of reversals."),
-    Doubt.PARITY: ("contradicts_spin", "the sign of the final spin does not match the number of reversals."),
-    Doubt.MARGIN: ("close_to_another", "a margin is smaller than ten times its error, so another count is possible."),
-    Doubt.ROUND_OFF: (
-        "round_off",
-        "round-off decides when late reversals come; their times and the final spin are unknown.",
-    ),
-    Doubt.TOLERANCE: ("misses_tolerance", "the estimated error of the final spin exceeds the tolerance."),
-}
-"""Names and sentences of the flags of `doubts`."""
+    Doubt.TIME_LIMIT: ("not_final", "the time limit came first, so more reversals may follow", "raise t_end"),
+    Doubt.STEP: ("depends_on_step", "longer steps give a different number of reversals", _FINER),
+    Doubt.WINDOWS: ("depends_on_windows", "averages over other windows give a different number of reversals", _LOOK),
+    Doubt.PARITY: ("contradicts_spin", "the sign of the final spin does not match the number of reversals", _LOOK),
+    Doubt.MARGIN: ("close_to_another", "a margin is smaller than ten times its error, so another count is possible",
+                   _FINER),
+    Doubt.ROUND_OFF: ("round_off", "round-off decides when late reversals come; their times and the final spin are "
+                      "unknown", ""),
+    Doubt.TOLERANCE: ("misses_tolerance", "the estimated error of the final spin exceeds the tolerance", _FINER),
+}  # fmt: skip
+"""Names of the flags of `doubts`, what each means, and what to do about it."""
 
 ROWS = {CASE: "Row of the table of cases.", SAMPLE: "Number of the sample."}
 """The meaning of the index along the rows of a table."""
@@ -100,8 +100,8 @@ VARIABLES: dict[str, Variable] = {
     "certain": _flag("is the count certain?", {0: "uncertain", 1: "certain"},
                      "Whether the number of reversals is final, with margins larger than ten times their errors; the "
                      "reasons against it are in doubts.", of_sound_runs=True),
-    "doubts": _flag("reasons for doubt", {int(bit): name for bit, (name, _) in DOUBTS.items()},
-                    "Bits by name: " + " ".join(f"{name}: {words}" for name, words in DOUBTS.values()),
+    "doubts": _flag("reasons for doubt", {int(bit): name for bit, (name, *_) in DOUBTS.items()},
+                    "Bits by name: " + " ".join(f"{name}: {words}." for name, words, _ in DOUBTS.values()),
                     of_sound_runs=True, masks=True),
     "t_stop": Variable("float64", TIME, "time of the end", "Time at which the simulation ended."),
     "method": _flag("integration method", {each.code: name for name, each in METHODS.items()}),

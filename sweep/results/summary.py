@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from sweep.faults import counted, duration
-from sweep.kernels.method import MISSED, STEP_RULES
+from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
-from sweep.results.dataset import REASONS, STATUSES, TRAJECTORIES, along_one, uncertain
+from sweep.results.dataset import DOUBTS, REASONS, STATUSES, TRAJECTORIES, along_one, uncertain
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, UNCERTAIN, WIDE
 from sweep.results.probabilities import PROBABILITIES
@@ -175,29 +175,22 @@ def _run(dataset: xr.Dataset) -> Iterator[str]:
         yield from _doubts(dataset, int(valid.sum()))
 
 
-_REMEDIES = {
-    Doubt.TIME_LIMIT: ("not settled at the time limit", "raise t_end"),
-    Doubt.STEP: ("different with a longer step", "lower the tolerance"),
-    Doubt.MARGIN: ("within ten times the error of another count", "lower the tolerance"),
-    Doubt.WINDOWS: ("different with averages over other windows", "look at the trajectory"),
-    Doubt.PARITY: ("at odds with the sign of the final spin", "look at the trajectory"),
-}
-"""Words for each reason against a count, and what to do about it; a count is listed with the first that applies."""
-
-
 def _doubts(dataset: xr.Dataset, counts: int) -> Iterator[str]:
-    """Say how many of the counts are certain, where the others lie and what to do, and which errors are large."""
+    """Say how many of the counts are certain, where the others lie and what to do, and which errors are large.
+
+    A count is listed with the first doubt that applies.
+    """
     left, doubts = uncertain(dataset), dataset["doubts"]
     if "certain" in dataset:
         others = "; the others:" if left.any() else ""
         yield f"{counts - int(left.sum())} of {counted(counts, 'count is', 'counts are')} certain{others}"
     elif left.any():
         yield f"{int(left.sum())} of {counted(counts, 'count is', 'counts are')} uncertain:"
-    for bit, (words, remedy) in _REMEDIES.items():
+    for bit, (_, words, remedy) in DOUBTS.items():
         these = left & (doubts & int(bit) > 0)
         left &= ~these
         if these.any():
-            yield f"  {int(these.sum())} {words}{_place(these)}: {remedy}"
+            yield f"  {int(these.sum())}{_place(these)}: {words}; {remedy}"
     if missed := int((doubts & int(Doubt.TOLERANCE) > 0).sum()):
         error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
         yield f"{missed} of {counted(counts, 'cell')} {'misses' if missed == 1 else 'miss'} the tolerance{error}"
@@ -225,10 +218,10 @@ def accuracy(dataset: xr.Dataset) -> Iterator[str]:
     names = ("status", "step_rule", "step")
     if {*names} <= {*dataset.data_vars} and (dataset["status"] != IMPOSSIBLE).any():
         status, rule, step = (np.ravel(dataset[name].values) for name in names)
-        step, rule = step[status != IMPOSSIBLE], rule[(status != IMPOSSIBLE) & (rule != MISSED)]
+        step, rule = step[status != IMPOSSIBLE], rule[status != IMPOSSIBLE]
         rules = {name: int((rule == code).sum()) for code, name in STEP_RULES.items() if code in rule}
         who = ", ".join(f"{name} in {counted(count, 'cell')}" for name, count in rules.items())
-        yield f"step: {step.min():.3g} to {step.max():.3g}{f', set by {who}' if who else ''}"
+        yield f"step: {step.min():.3g} to {step.max():.3g}, set by {who}"
     if dataset.attrs.get("wall_time"):
         rate = dataset.attrs.get("trajectories_per_second", np.nan)
         yield f"cost: {duration(dataset.attrs['wall_time'])}, {rate:.3g} trajectories/s"

@@ -31,7 +31,7 @@ def test_a_body_in_any_units_is_the_one_in_those_of_si(write: Write) -> None:
     for name, value in expected.parameters.items():
         assert found.parameters[name].numbers == pytest.approx(value.numbers, rel=1e-14), name
     assert found.integrator == expected.integrator
-    assert load_config(write(found.to_yaml(), "again.yaml")) == found
+    assert load_config(write(found.label(), "again.yaml")) == found
 
 
 VALUES: Mapping[str, tuple[float, ...]] = {

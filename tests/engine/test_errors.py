@@ -15,7 +15,7 @@ from sweep.engine import errors
 from sweep.engine.executor import execute
 from sweep.engine.life import begin, live
 from sweep.engine.plan import first_tolerance, kernel_of, plan, steps_of
-from sweep.kernels.method import FIXED, MISSED, REPEAT
+from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.methods import PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT, Doubt
 from sweep.results.dataset import measured
@@ -68,7 +68,7 @@ def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None
     )
     assert abs(float(once.spin_final[0]) - SPINS[0]) > 1e-7
     assert float(once.spin_error[0]) > 1e-7
-    assert int(once.step_rule[0]) == MISSED
+    assert int(once.doubts[0]) & Doubt.TOLERANCE
 
 
 def test_spins_alike_by_chance_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,7 +111,7 @@ def test_no_error_is_claimed_for_a_spin_that_round_off_decides(tolerance: float)
     assert abs(float(found.spin_final[0]) - 0.0386) > 0.01
     assert found.doubts[0].item() & Doubt.ROUND_OFF
     assert np.isnan(found.spin_error[0])
-    assert int(found.step_rule[0]) != MISSED
+    assert not int(found.doubts[0]) & Doubt.TOLERANCE
     assert "round-off decides" in describe(found).splitlines()[-1]
 
 
@@ -146,7 +146,6 @@ def test_what_nobody_asked_for_is_not_run(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_chaotic_cell_says_so() -> None:
     """It would count otherwise from another start, and no step is short enough for it."""
     found = cells([CHAOTIC, BODY], t_end=10_000)
-    assert found.step_rule.values[0] == MISSED
     assert found.spin_error.values[0] > 1e-5
     assert (found.doubts.values & (Doubt.STEP | Doubt.TOLERANCE)).tolist() == [Doubt.STEP | Doubt.TOLERANCE, 0]
 

@@ -18,6 +18,7 @@ from click.testing import CliRunner
 from sweep.cli import main
 from sweep.cli.options import _values, loaded
 from sweep.config import InputError, load_config
+from sweep.config.document import dump
 from sweep.config.schema import PATHS
 from sweep.faults import FileError
 from sweep.parameters import PARAMETERS
@@ -59,10 +60,10 @@ def _refused(call: Callable[[], Any], *files: str) -> Any:
 def round_trip(config: Any, folder: Path) -> None:
     """A configuration is the same when it is written to a file and read again, and its name stays in the folder."""
     again = folder / "again.yaml"
-    again.write_text(config.to_yaml(), encoding="utf-8")
+    again.write_text(dump(config.document()), encoding="utf-8")
     other = load_config(again)
     if (other.fingerprint(), list(other.axes)) != (config.fingerprint(), list(config.axes)):
-        raise Violation(f"read again, another configuration:\n{config.to_yaml()}\n{other.to_yaml()}")
+        raise Violation(f"read again, another configuration:\n{config.label()}\n{other.label()}")
     if Path(os.path.normpath(folder / config.name)).parent != folder or not config.name.isprintable():
         raise Violation(f"a name that leaves the folder: {config.name!r}")
 
