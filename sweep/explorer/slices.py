@@ -18,6 +18,7 @@ from sweep.faults import FileError
 from sweep.grid import Array
 from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe
+from sweep.plots.pictures import of
 from sweep.results.dataset import FURTHER
 from sweep.results.kind import kind, opened
 from sweep.results.netcdf import open_dataset
@@ -131,7 +132,7 @@ class Source:
 
     def _value(self, cell: xr.Dataset, name: str) -> str:
         values = np.ravel(cell[name].values)
-        if name == "difference":
+        if of(name).scale == "differences":
             return labels.number(values[0]) if values[0] <= 0 else f"+{values[0]}"
         if flags := labels.flag_words(cell, name):
             return ", ".join(flags.get(int(v), str(v)) for v in values)

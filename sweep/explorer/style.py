@@ -21,6 +21,7 @@ from sweep.explorer.state import State
 from sweep.grid import Array
 from sweep.plots import marks, scales
 from sweep.plots.description import Map, common_scale
+from sweep.plots.pictures import of
 from sweep.plots.scales import AUTO, Scale
 
 SOFT = "#77828d"
@@ -92,7 +93,7 @@ def scale_of(part: Map, state: State, *others: Map) -> Scale:
     if not state.limits or not shown.size:
         return common_scale([part, *others], cmap=palette)
     low, high = state.limits.get("low", shown.min()), state.limits.get("high", shown.max())
-    possible = low < high and (low > 0 or part.name != "ratio")
+    possible = low < high and (low > 0 or of(part.name).scale != "ratios")
     return common_scale([part], (low, high) if possible else AUTO, palette)
 
 

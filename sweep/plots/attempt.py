@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from sweep.faults import Error, FileError, brief
+from sweep.faults import Error, FileError
 
 
 def attempt(result: xr.Dataset, path: Path, note: Callable[[str], None], variable: str | None = None) -> None:
@@ -18,12 +18,11 @@ def attempt(result: xr.Dataset, path: Path, note: Callable[[str], None], variabl
     FileError
         if the file cannot be written, as on a full disk.
     """
-    try:
-        from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
+    from sweep.plots import picture  # importing matplotlib takes a third of the time of `import sweep`
 
+    try:
         picture.plot(result, variable, output=path)
     except FileError:
         raise
-    except Exception as error:
-        words = str(error) if isinstance(error, Error) else brief(f"{type(error).__name__}: {error}")
-        note(f"no picture{f' of {variable}' if variable else ''}: {words}")
+    except Error as error:
+        note(f"no picture{f' of {variable}' if variable else ''}: {error}")

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.plots import labels, lines, places, scales
-from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
+from sweep.plots.figure import RATIO, Sheet, arrangement, panel_width, set_scale
 from sweep.plots.panels import MAX_PANELS
 from sweep.plots.theory import Line
 from sweep.results.margins import WIDE, distinct, smoothed
@@ -23,7 +23,7 @@ _WIDE: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": "none", "m
 """Style of points whose brackets are wide."""
 
 
-def draw(dataset: xr.Dataset) -> Picture:
+def draw(dataset: xr.Dataset) -> Sheet:
     """Draw the boundaries over two axes or along the only one, and mark points whose brackets are wide."""
     if "y" not in dataset.attrs:
         return _along(dataset, dataset.attrs["x"])
@@ -35,7 +35,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     panels = every[:MAX_PANELS]
     rows, columns = arrangement(len(panels), 1)
     width = panel_width(columns, 5.2, 0.6)
-    figure = Picture(dataset, width * columns + 0.6, 1.2 + width * RATIO * rows)
+    figure = Sheet(dataset, width * columns + 0.6, 1.2 + width * RATIO * rows)
     scale = scales.counts(dataset["level"].values if dataset.sizes["point"] else np.zeros(1, int))
     for axes, (words, part) in zip(figure.panels(rows, columns, len(panels)), panels, strict=True):
         axes.set_title(words)
@@ -62,10 +62,10 @@ def _wide(dataset: xr.Dataset) -> str:
     return f"wide bracket: a cell failed or is not certain ({count} of {dataset.sizes['point']})" if count else ""
 
 
-def _along(dataset: xr.Dataset, x: str) -> Picture:
+def _along(dataset: xr.Dataset, x: str) -> Sheet:
     """Draw the count along the only axis: a step at each boundary, and a grey band over each wide bracket."""
     width = panel_width(1, 5.2, 0.6)
-    figure = Picture(dataset, width + 0.6, 1.2 + width * RATIO)
+    figure = Sheet(dataset, width + 0.6, 1.2 + width * RATIO)
     (axes,) = figure.panels(1, 1, 1)
     set_scale(axes, "x", _axis(dataset, x).values)
     ends = np.stack([dataset["end_fewer"].values, dataset["end_more"].values])

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from sweep.axis import Axis
 from sweep.plots import labels, theory
 from sweep.plots.description import along
-from sweep.plots.figure import Picture, framed, set_scale, write_words, zero_line
+from sweep.plots.figure import Sheet, framed, set_scale, write_words, zero_line
 from sweep.plots.panels import MAX_PANELS, check, indices
 
 _COLOURS = {"n_c1": "C0", "n_c2": "C1"}
@@ -26,10 +26,10 @@ _SOURCES: dict[str, tuple[str, dict[str, Any]]] = {
 """Sources of a critical spin, by the suffix of its variable: their words and styles."""
 
 
-def draw(dataset: xr.Dataset) -> Picture:
+def draw(dataset: xr.Dataset) -> Sheet:
     """Draw critical spins by formula, eigenvalues and simulation, over the longest axis."""
     dims = sorted((str(d) for d in dataset["n_c_reason"].dims if d != "sign"), key=lambda d: -dataset.sizes[d])
-    check(dataset, dims, "n_c_reason")
+    check(dataset, dims)
     x = dims[0] if dims else ""
     panels = indices(dataset, dims[1:])
     figure, frames = framed(dataset, panels[:MAX_PANELS], x)

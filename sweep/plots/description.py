@@ -15,6 +15,7 @@ from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.plots import labels, scales, theory
 from sweep.plots.marks import BLANK, legend, marks
+from sweep.plots.pictures import of
 from sweep.plots.quantities import field
 from sweep.plots.scales import AUTO, Limits, Scale
 from sweep.plots.theory import Line, table
@@ -65,8 +66,8 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
     """
     found, kinds = field(dataset, name), marks(dataset, name)
     across, up = Axis(x, along(dataset, x)), Axis(y, along(dataset, y))
-    lines = theory.lines(dataset, across, up) if y and name in theory.REVERSALS else []
-    lines += boundaries(dataset, across, up) if y and name == "reversals" else []
+    lines = theory.lines(dataset, across, up) if y and of(name).theory else []
+    lines += boundaries(dataset, across, up) if y and of(name).boundaries else []
     return Map(
         name, across, up, table(found, across, up), {kind: table(where, across, up) for kind, where in kinds.items()},
         legend(dataset, name), labels.flag_words(dataset.assign({name: found}), name), lines,
@@ -99,8 +100,6 @@ def common_scale(maps: Sequence[Map], limits: Limits = AUTO, cmap: str | None = 
         return scales.flags(present or first.flags, cmap)
     if not values.size:
         values = np.zeros(1, first.values.dtype)
-    if first.name == "ratio":
-        return scales.ratios(values, limits, cmap)
-    if values.dtype.kind not in "iu":
-        return scales.continuous(values, limits, cmap)
-    return (scales.differences if first.name == "difference" else scales.counts)(values, limits, cmap)
+    usual = "counts" if values.dtype.kind in "iu" else "continuous"
+    scale: Scale = getattr(scales, of(first.name).scale or usual)(values, limits, cmap)
+    return scale

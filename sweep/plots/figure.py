@@ -86,7 +86,7 @@ def style(width: float | None) -> dict[Any, Any]:
     return unchanged | ({"figure.figsize": [width, width / 2]} if width else {})
 
 
-class Picture(Figure):
+class Sheet(Figure):
     """A figure that a notebook shows as the value of a cell, even before pyplot has drawn anything.
 
     Before that, IPython has no way to show a figure of matplotlib, and prints its name.  It keeps the style in which it
@@ -265,11 +265,11 @@ Frames = list[tuple[Axes, xr.Dataset]]
 """Axes, and the part of a dataset to draw there."""
 
 
-def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Picture, Frames]:
+def framed(dataset: xr.Dataset, panels: list[Panel], x: str) -> tuple[Sheet, Frames]:
     """Make a figure with axes over `x` for each panel of a dataset, paired with the part to draw there."""
     rows, columns = arrangement(len(panels), 1.5 if is_column() else 2)
     high = 2.8 if dataset.sizes.get(x, 1) > 1 else 0.9  # a single cell is written in words
-    figure = Picture(dataset, panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
+    figure = Sheet(dataset, panel_width(columns, 7.0, 0) * columns, 1.9 + high * rows)
     frames = list(zip(figure.panels(rows, columns, len(panels), sharex=True), panels, strict=True))
     for k, (axes, panel) in enumerate(frames):
         lowest = k + columns >= len(panels)

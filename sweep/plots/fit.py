@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.plots import labels
-from sweep.plots.figure import Picture, is_column, page, panel_width, zero_line
+from sweep.plots.figure import Sheet, is_column, page, panel_width, zero_line
 from sweep.results.summary import bound, verdict
 
 _VALUES = 3.2
@@ -20,7 +20,7 @@ _LETTERS = 13
 """Letters of the verdict per inch."""
 
 
-def draw(dataset: xr.Dataset) -> Picture:
+def draw(dataset: xr.Dataset) -> Sheet:
     """Draw the film and the fit, or the fits of several laws, over time, with the residuals below.
 
     Outliers are crossed out, and a band shows the noise of the residuals.  The title gives the verdict and the legend
@@ -29,7 +29,7 @@ def draw(dataset: xr.Dataset) -> Picture:
     width = panel_width(1, 11, 0)
     sentences = [] if is_column() else verdict(dataset)
     lines = [line for each in sentences for line in textwrap.wrap(each, int(_LETTERS * width))]
-    figure = Picture(dataset, width, (3.6 if is_column() else 6) + 0.15 * len(lines), constants=False)
+    figure = Sheet(dataset, width, (3.6 if is_column() else 6) + 0.15 * len(lines), constants=False)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     above.set_title("\n".join(lines), loc="left", fontsize="small")
     time, seen = dataset["time"].values, dataset["seen"].values

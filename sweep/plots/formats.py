@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-PICTURES = ("png", "pdf", "svg")
+SUFFIXES = ("png", "pdf", "svg")
 A_PICTURE = "png, pdf or svg"
-"""`PICTURES` in words, for messages."""
+"""`SUFFIXES` in words, for messages."""
 
 
 def suffix(path: Path) -> str:

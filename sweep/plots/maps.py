@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from sweep.parameters import PARAMETERS
 from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
-from sweep.plots.figure import RATIO, Picture, arrangement, panel_width, set_scale
+from sweep.plots.figure import RATIO, Sheet, arrangement, panel_width, set_scale
 from sweep.plots.marks import legend, with_results
 from sweep.plots.panels import Panel, Panels, title
 from sweep.plots.scales import AUTO, Limits, Scale, thinned
@@ -33,7 +33,7 @@ _OF_DIFFERENCES = ("failed", "not_run", "impossible", "no_value", "time_limit")
 """Kinds of cell that maps of differences and ratios mark too; the map of the simulated counts next to them has all."""
 
 
-def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Picture:
+def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Sheet:
     """Draw a map of each variable over two axes, and one such row for each value of the other axes.
 
     All maps of a variable and of its prediction share a scale and its bar; the legend explains flags.
@@ -44,7 +44,7 @@ def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Pict
     rows, groups = arrangement(len(maps), len(names))
     columns = groups * len(names)
     width = panel_width(columns, _WIDEST, _AROUND)
-    figure = Picture(dataset, width * columns + _AROUND, 2.0 + width * RATIO * rows)
+    figure = Sheet(dataset, width * columns + _AROUND, 2.0 + width * RATIO * rows)
     frames = figure.panels(rows, columns, count, sharex=True, sharey=True)
     scales = _scales(panels, maps, limits, cmap)
     entries: dict[str, Artist] = {}

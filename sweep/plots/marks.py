@@ -11,8 +11,9 @@ import xarray as xr
 from sweep.grid import Array
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT, Doubt
 from sweep.plots.labels import is_code
-from sweep.plots.quantities import DERIVED, field
-from sweep.results.dataset import STATUS_WORDS, VARIABLES, uncertain
+from sweep.plots.pictures import of
+from sweep.plots.quantities import field
+from sweep.results.dataset import STATUS_WORDS, uncertain
 
 WORDS = {
     "not_run": "not run",
@@ -28,21 +29,6 @@ WORDS = {
 BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
 
-_GROWING = {"reversals", "t_last_reversal", "difference"}
-"""Variables that a longer trajectory can only raise (in a difference, the simulated count)."""
-
-_PER_VARIABLE = {
-    ("t_last_reversal", "no_value"): "no reversal",
-    ("t_first_reversal", "no_value"): "no reversal",
-    ("t_first_reversal_predicted", "no_value"): "none predicted",
-    ("ratio", "no_value"): "no reversal, or none predicted",
-    ("reversal_times", "no_value"): "no such reversal",
-    **dict.fromkeys(
-        [("spin_final", "time_limit"), ("spin_mean", "time_limit"), ("t_stop", "time_limit")],
-        "not settled: time limit",
-    ),
-}
-
 
 def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     """Return the cells of each kind in `WORDS`.
@@ -56,28 +42,27 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     Booleans over the dimensions of the variable, for all kinds.  Kinds that do not concern the variable (a prediction
     cannot fail, a final spin is no count) are false everywhere.
     """
-    found, simulated = field(dataset, name), _is_simulated(name)
+    found, picture = field(dataset, name), of(name)
     none = found.isnull() & False
 
     def among(variable: str, *values: int) -> xr.DataArray:
         """Return where a variable has one of these flags; nowhere if its values are no longer codes."""
-        if not simulated or variable not in dataset or not is_code(dataset[variable]):
+        if not picture.simulated or variable not in dataset or not is_code(dataset[variable]):
             return none
         return none | dataset[variable].isin(values)
 
     not_run, failed = among("status", 0), among("status", *FAILURES)
     impossible, missing = among("status", IMPOSSIBLE), found.isnull()
     sound = ~(not_run | failed | impossible)
-    known = simulated and all(name in dataset and is_code(dataset[name]) for name in ("status", "doubts"))
-    grows, limited = name in _GROWING, name in _GROWING or (name, "time_limit") in _PER_VARIABLE
+    known = picture.simulated and all(each in dataset and is_code(dataset[each]) for each in ("status", "doubts"))
     return {
         "not_run": not_run,
         "failed": failed,
         "impossible": impossible,
         "no_value": missing & sound,
-        "time_limit": among("status", TIME_LIMIT) & ~missing & limited,
+        "time_limit": among("status", TIME_LIMIT) & ~missing & ("time_limit" in picture.words),
         "round_off": none | (sound & (dataset["doubts"] & int(Doubt.ROUND_OFF) > 0) if known else False),
-        "uncertain": none | (uncertain(dataset) if known and grows else False),
+        "uncertain": none | (uncertain(dataset) if known and "uncertain" in picture.words else False),
     }
 
 
@@ -99,8 +84,4 @@ def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
         codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
-    return _PER_VARIABLE.get((name, kind), WORDS[kind])
-
-
-def _is_simulated(name: str) -> bool:
-    return name in DERIVED or name == "t_stop" or (name in VARIABLES and VARIABLES[name].of_sound_runs)
+    return of(name).words.get(kind, WORDS[kind])

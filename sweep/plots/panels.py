@@ -17,7 +17,8 @@ import xarray as xr
 from sweep.config.document import is_number, plain_data
 from sweep.faults import fault_of, refusal
 from sweep.plots import labels
-from sweep.plots.quantities import COMPARISONS, derivable, field, first_picture, subject
+from sweep.plots.pictures import of
+from sweep.plots.quantities import derivable, field, first_picture, subject
 from sweep.results.kind import odd_axis
 
 MAX_PANELS = 8
@@ -28,7 +29,7 @@ _MAX_VALUES = 1000
 others are not read."""
 
 _TELLING = 3
-"""Number of maps of probabilities, one per count, in a figure by default."""
+"""Largest number of maps along a dimension that other panels show together."""
 
 _PANEL_VALUES = 4
 """A longer axis is drawn as an axis; a shorter one gets a panel for each value."""
@@ -49,7 +50,7 @@ class Panels:
     names: list[str]
     """The variable, or the two that it compares, which share a scale."""
     compared: list[str]
-    """Their comparison, for maps alone: `difference` or `ratio`."""
+    """Their comparison, for maps alone."""
     across: list[str]
     """Dimensions drawn as axes, the vertical one first: up to two."""
     each: list[Panel]
@@ -80,28 +81,32 @@ def choose(
     first = field(dataset, names[0])
     if first.dtype.kind not in "fiub":
         raise fault_of(f"the values of {names[0]} are not numbers; choose another variable", "variable")
+    if names[0] not in dataset.data_vars:
+        dataset = dataset.assign({names[0]: first})
     dims = [str(d) for d in first.dims]
-    check(dataset, dims, names[0])
+    check(dataset, dims)
+    shown = of(names[0])
+    if lost := [d for d in shown.together if d not in first.coords]:
+        raise fault_of(f"{names[0]} has lost its axis {lost[0]}; reduce the dataset along other axes", "variable")
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
             raise fault_of(f"{names[0]} has no axis {name}; its axes are {', '.join(dims) or 'none'}", option)
     if x is not None and x == y:
         raise fault_of(f"{x} is the other axis already; choose two axes", "y")
-    across = _across(dataset, dims, x, y)
-    if names == ["probability"]:  # bars show more than curves of one point
+    across = _across(dataset, [d for d in dims if shown.over_axis and d not in shown.together], x, y)
+    if shown.draw:  # a curve of one point shows less than its own drawing
         across = [d for d in across if dataset.sizes[d] > 1 or d in (x, y)]
-    rest = [d for d in dims if d not in across]
-    if names == ["probability"] and len(across) < 2:
-        rest = [d for d in rest if d != "count"]  # all counts are drawn together
-    elif names == ["probability"] and "count" in rest:
-        dataset = dataset.isel(count=_telling(dataset))
+    if len(across) == 1 and not shown.over_axis and across[0] not in shown.together:
+        raise fault_of(f"{names[0]} is not drawn over one axis; leave it out, or give both x and y", "x" if x else "y")
+    rest = [d for d in dims if d not in across and (len(across) == 2 or d not in shown.together)]
+    dataset = dataset.isel({d: _telling(first, d) for d in rest if d in shown.together})
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
         raise fault_of(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")
     whole = dataset
     if len(across) == 2:
         dataset = dataset.isel({d: slice(None, None, -(-dataset.sizes[d] // _MAX_VALUES)) for d in across})
-    dataset = dataset.assign({name: field(dataset, name) for name in names + compared})
+    dataset = dataset.assign({name: field(dataset, name) for name in names[1:] + compared})
     dataset = dataset.sortby([d for d in across if d in dataset.coords])
     return Panels(dataset, whole, names, compared, across, indices(dataset, rest))
 
@@ -119,7 +124,7 @@ def nearest(dataset: xr.Dataset, at: Mapping[str, Any]) -> dict[str, int]:
         if name not in dataset.dims or name not in dataset.coords:
             axes = ", ".join(str(d) for d in dataset.dims if d in dataset.coords)
             raise fault_of(f"there is no axis {name}; the axes are {axes or 'none'}", "at")
-        check(dataset, [name], name)
+        check(dataset, [name])
         of_axis = isinstance(wanted, xr.DataArray) and wanted.attrs.get("units") == dataset[name].attrs.get("units")
         value = plain_data(wanted.values if of_axis else wanted)
         if not (is_number(value) and math.isfinite(value)):
@@ -135,10 +140,8 @@ def nearest(dataset: xr.Dataset, at: Mapping[str, Any]) -> dict[str, int]:
     return found
 
 
-def check(dataset: xr.Dataset, dims: list[str], name: str) -> None:
-    """Raise an `InputError` if a variable cannot be drawn over these dimensions."""
-    if name == "probability" and "count" not in dataset.coords:
-        raise fault_of("the probabilities have lost their axis count; reduce the dataset along other axes", "variable")
+def check(dataset: xr.Dataset, dims: list[str]) -> None:
+    """Raise an `InputError` if nothing can be drawn over these dimensions."""
     if odd := odd_axis(dataset, dims):
         raise fault_of(odd)
     for d in dims:
@@ -161,20 +164,20 @@ def title(dataset: xr.Dataset, panel: Panel) -> str:
 def _variables(dataset: xr.Dataset, variable: str | None, *, alone: bool) -> tuple[list[str], list[str]]:
     """The variables to draw, and how they compare."""
     chosen = variable or (subject if alone else first_picture)(dataset)
-    pair = [] if alone or chosen not in derivable(dataset) else [*COMPARISONS.get(chosen, ())]
+    pair = [] if alone or chosen not in derivable(dataset) else [*of(chosen).compares]
     return (pair, [chosen]) if pair else ([chosen], [])
 
 
 def _across(dataset: xr.Dataset, dims: list[str], x: str | None, y: str | None) -> list[str]:
     """The dimensions to draw as axes, the vertical one first: those asked for, then the first long ones."""
     free = [d for d in dims if d not in (x, y)]
-    long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES and d != "count"]
-    longest = sorted((d for d in free if d != "count"), key=lambda d: -dataset.sizes[d])[:1]
+    long = [d for d in free if dataset.sizes[d] > _PANEL_VALUES]
+    longest = sorted(free, key=lambda d: -dataset.sizes[d])[:1]
     rest = iter(long if x else long or longest)
     return [d for d in (y or next(rest, None), x or next(rest, None)) if d]
 
 
-def _telling(dataset: xr.Dataset) -> list[int]:
-    """Return the indices of up to three counts whose probability differs most from cell to cell, in ascending order."""
-    over = [d for d in dataset["probability"].dims if d != "count"]
-    return sorted(np.argsort(-dataset["probability"].std(over).values)[:_TELLING].tolist())
+def _telling(values: xr.DataArray, dim: str) -> list[int]:
+    """Return up to three indices along `dim` whose values differ most from cell to cell, in ascending order."""
+    spread = values.std([d for d in values.dims if d != dim]).values
+    return sorted(np.argsort(-spread)[:_TELLING].tolist())

@@ -25,9 +25,9 @@ from sweep.plots import (
     scales,
     trajectories,
 )
-from sweep.plots.figure import Picture, drawing, framed, is_column, style
-from sweep.plots.formats import A_PICTURE, PICTURES, suffix
-from sweep.plots.quantities import DERIVED
+from sweep.plots.figure import Sheet, drawing, framed, is_column, style
+from sweep.plots.formats import A_PICTURE, SUFFIXES, suffix
+from sweep.plots.pictures import PICTURES
 from sweep.plots.scales import Limits
 from sweep.results.dataset import VARIABLES
 from sweep.results.kind import (
@@ -50,7 +50,7 @@ _NO_DATE: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"D
 _NARROWEST, _WIDEST = 0.05, 1.0
 """Largest width of a figure in metres."""
 
-_OWN: dict[Kind, Callable[[xr.Dataset], Picture]] = {
+_OWN: dict[Kind, Callable[[xr.Dataset], Sheet]] = {
     TRAJECTORY: trajectories.draw,
     CRITICAL: critical.draw,
     BOUNDARIES: boundaries.draw,
@@ -79,8 +79,8 @@ def plot(
     Parameters
     ----------
     dataset : a dataset, the path of its file, or one of its variables, whose cells then have no marks
-    variable : of the dataset, or one of `sweep.plots.quantities.DERIVED`.  Maps of `difference` and `ratio` are shown
-        together with the two variables that they compare, except in a figure as narrow as a column of text.  By default
+    variable : of the dataset, or one of `sweep.plots.pictures.PICTURES`.  Maps that compare two variables are shown
+        together with these, except in a figure as narrow as a column of text.  By default
         the first that the configuration names under `picture`, or else the reversals, compared with the prediction if
         there is one
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
@@ -115,7 +115,7 @@ def plot(
     >>> sweep.plot(maps, width="85mm", output="column.pdf").get_size_inches()[0] * 25.4
     np.float64(85.0)
     """
-    if output is not None and suffix(local_path(output)) not in PICTURES:
+    if output is not None and suffix(local_path(output)) not in SUFFIXES:
         raise fault_of(f"{output}: unknown format; write a {A_PICTURE}", "output")
     low, high = _limit(vmin, "vmin"), _limit(vmax, "vmax")
     if low is not None and high is not None and not low < high:
@@ -152,7 +152,7 @@ def plot(
 def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
     """Return the dataset that is given, or read it; a variable brings its coordinates along."""
     if isinstance(source, xr.DataArray):
-        if source.name not in {*VARIABLES, *DERIVED}:
+        if source.name not in {*VARIABLES, *PICTURES}:
             raise fault_of(f"{source.name or 'an array without a name'} is not a variable of a run; pass the dataset")
         return source.to_dataset().assign_attrs({ATTRIBUTE: RUN.name})
     if isinstance(source, xr.Dataset):
@@ -160,7 +160,7 @@ def _opened(source: xr.Dataset | xr.DataArray | str | Path) -> xr.Dataset:
     return open_dataset(local_path(source, "dataset", "a dataset or the path of its file"))
 
 
-def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Picture:
+def _drawn(dataset: xr.Dataset, variable: str | None, axes: dict[str, Any], how: dict[str, Any]) -> Sheet:
     """Draw a dataset of any kind."""
     of_kind = kind(dataset)
     if of_kind and of_kind in _OWN and (of_kind != CRITICAL or variable is None):
@@ -184,7 +184,7 @@ def _draw_in(ax: Axes, dataset: xr.Dataset, variable: str | None, axes: dict[str
     if kind(dataset) not in (RUN, None):
         raise fault_of("only a map or a curve of a run is drawn into given axes", "ax")
     chosen = panels.choose(dataset, variable, **axes, alone=True)
-    if len(chosen.each) > 1 or (chosen.names == ["probability"] and "count" in chosen.dataset.dims):
+    if len(chosen.each) > 1:
         raise fault_of(f"{chosen.names[0]} needs more than one panel; select a value of each other axis", "ax")
     _require_scale(chosen, **how)
     if len(chosen.across) == 2:

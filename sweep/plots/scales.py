@@ -98,7 +98,9 @@ def counts(values: Array, limits: Limits = AUTO, name: str | None = None) -> Sca
 
 
 def differences(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
-    """A diverging scale of integers, symmetric about zero, which has its own colour."""
+    """A diverging scale of integers, symmetric about zero, which has its own colour; `continuous` for mean ones."""
+    if values.dtype.kind not in "iu":
+        return continuous(values, limits, name)
     top = max(round(float(np.abs(_given(limits) or values).max(initial=0))), 1)
     side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
     return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)

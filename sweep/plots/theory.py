@@ -16,9 +16,6 @@ from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
 
-REVERSALS = ("reversals", "reversals_estimated", "reversals_predicted", "difference")
-"""The variables that theory explains."""
-
 _SOURCES = {
     "n_c1": (("_linear", "eigenvalues"), ("", "formula")),
     "n_c2": (("_simulated", "simulation"), ("", "formula")),

@@ -17,7 +17,7 @@ from sweep.kernels.status import SETTLED
 from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
-from sweep.plots.figure import Picture, is_column, panel_width, zero_line
+from sweep.plots.figure import Sheet, is_column, panel_width, zero_line
 from sweep.results.dataset import TRAJECTORIES, along_one
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -51,7 +51,7 @@ _ENDLESS = ("heading", "table_x", "table_y")
 """Series that keep changing while a body spins steadily."""
 
 
-def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
+def draw(dataset: xr.Dataset, variable: str | None = None) -> Sheet:
     """Draw the spin with its reversals and critical values over time, and below it the other series of the dataset.
 
     The time axis ends a while after the last event (`lively_until`).  In a column of text, only the spin is drawn.
@@ -75,7 +75,7 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Picture:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
         panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
     rows = -(-len(panels) // 2)
-    figure = Picture(constants_apart(dataset), panel_width(1, 11, 0), 4.2 + 1.9 * rows)
+    figure = Sheet(constants_apart(dataset), panel_width(1, 11, 0), 4.2 + 1.9 * rows)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)
     first = figure.add_subplot(grid[0, :])
     only = {} if variable in (None, "spin") else {variable: labels.words(dataset, variable)}

@@ -38,7 +38,7 @@ from sweep.config import Config, InputError, load_config
 from sweep.config.document import parse_value
 from sweep.faults import Error
 from sweep.kernels.status import IMPOSSIBLE, TIME_LIMIT
-from sweep.plots.formats import PICTURES
+from sweep.plots.formats import SUFFIXES
 from sweep.results.kind import RUN, kind, require_whole
 from sweep.results.summary import contents, describe
 from sweep.units import PAPER_UNITS
@@ -441,7 +441,7 @@ class Machine(RuleBasedStateMachine):
             xr.testing.assert_identical(again.drop_attrs(deep=False), dataset.drop_attrs(deep=False))
         return again
 
-    @rule(which=NUMBER, arguments=PICTURE, at=NUMBER, form=st.sampled_from(["", *PICTURES]))
+    @rule(which=NUMBER, arguments=PICTURE, at=NUMBER, form=st.sampled_from(["", *SUFFIXES]))
     def plot(self, which: int, arguments: Draws, at: int, form: str) -> None:
         """A picture shows what the dataset has there, in any format, and however the dataset is ordered."""
         self._drawn(self.others[which % len(self.others)], arguments, at, form)

@@ -115,7 +115,7 @@ def test_boundaries_without_a_whole_number_are_not_drawn() -> None:
 
 def test_samples_without_a_status_or_counts() -> None:
     """A mean of the status is none, so that nobody knows the number of samples, and a mean over counts has no sense."""
-    with pytest.raises(InputError, match="the probabilities have lost their axis count"):
+    with pytest.raises(InputError, match="probability has lost its axis count"):
         picture.plot(sampled().mean())
     for part in (sampled().mean("n0"), sampled().isel(n0=0).drop_vars("status")):
         assert entries(picture.plot(part)) == ["share of the samples"]
