@@ -85,21 +85,21 @@ def choose(
         dataset = dataset.assign({names[0]: first})
     dims = [str(d) for d in first.dims]
     check(dataset, dims)
-    shown = of(names[0])
-    if lost := [d for d in shown.together if d not in first.coords]:
+    own = of(names[0])
+    if lost := [d for d in own.together if d not in first.coords]:
         raise fault_of(f"{names[0]} has lost its axis {lost[0]}; reduce the dataset along other axes", "variable")
     for option, name in (("x", x), ("y", y)):
         if name is not None and name not in dims:
             raise fault_of(f"{names[0]} has no axis {name}; its axes are {', '.join(dims) or 'none'}", option)
     if x is not None and x == y:
         raise fault_of(f"{x} is the other axis already; choose two axes", "y")
-    across = _across(dataset, [d for d in dims if shown.over_axis and d not in shown.together], x, y)
-    if shown.draw:  # a curve of one point shows less than its own drawing
+    across = _across(dataset, [d for d in dims if own.over_axis and d not in own.together], x, y)
+    if own.draw:  # a curve of one point shows less than its own drawing
         across = [d for d in across if dataset.sizes[d] > 1 or d in (x, y)]
-    if len(across) == 1 and not shown.over_axis and across[0] not in shown.together:
+    if len(across) == 1 and not own.over_axis and across[0] not in own.together:
         raise fault_of(f"{names[0]} is not drawn over one axis; leave it out, or give both x and y", "x" if x else "y")
-    rest = [d for d in dims if d not in across and (len(across) == 2 or d not in shown.together)]
-    dataset = dataset.isel({d: _telling(first, d) for d in rest if d in shown.together})
+    rest = [d for d in dims if d not in across and (len(across) == 2 or d not in own.together)]
+    dataset = dataset.isel({d: _telling(first, d) for d in rest if d in own.together})
     if (count := math.prod(dataset.sizes[d] for d in rest)) > MAX_PANELS:
         shown = " × ".join(f"{d}: {dataset.sizes[d]}" for d in rest)
         raise fault_of(f"{count} panels ({shown}) are more than {MAX_PANELS}; select one value of an axis")

@@ -1,9 +1,11 @@
 """Pictures of datasets that have lost something or have one value or none, and sizes and limits at the edge."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from time import perf_counter
 from typing import Any
+from unittest.mock import Mock
 
 import matplotlib as mpl
 import numpy as np
@@ -19,6 +21,7 @@ from sweep.config import InputError
 from sweep.faults import FileError
 from sweep.kernels.status import SETTLED, TOPPLED
 from sweep.plots import picture, scales
+from sweep.plots.attempt import attempt
 from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.kind import SPINS
 from sweep.results.margins import POINTS
@@ -227,6 +230,15 @@ def test_what_matplotlib_cannot_draw_is_one_line(tmp_path: Path, monkeypatch: py
     assert str(refused.value).endswith("; check its settings, such as text.usetex")
     assert "\n" not in str(refused.value)
     assert not list(tmp_path.iterdir())
+
+
+def test_an_error_of_our_own_in_a_drawing_is_not_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    notes = list[str]()
+    for error, shown in ((InputError([]), False), (TypeError("a mistake"), True)):
+        monkeypatch.setattr(picture, "plot", Mock(side_effect=error))
+        with pytest.raises(TypeError, match="a mistake") if shown else nullcontext():
+            attempt(made(), tmp_path / "made.png", notes.append)
+    assert len(notes) == 1
 
 
 def test_labels_of_bars_stay_in_the_figure() -> None:
