@@ -21,6 +21,7 @@ from support import ROOT
 from sweep.config import Config, InputError, load_config
 from sweep.config.distributions import FAMILIES
 from sweep.config.schema import PATHS, schema_of
+from sweep.faults import Fault
 from sweep.kernels.measures import MEASURES, chosen
 from sweep.kernels.methods import AUTO, automatic, cheapest
 from sweep.models import TIERS
@@ -182,14 +183,18 @@ def accepted(flat: Flat, base: str = "paper") -> tuple[Flat, Config]:
         except InputError as error:
             check_refusal(error, "")
             for fault in error.faults:
-                paths = [".".join(map(str, fault.path[:k])) for k in range(len(fault.path), 0, -1)]
-                if found := [path for path in paths if path in flat]:
-                    del flat[found[0]]
-                elif fault.message.startswith("missing"):
-                    flat[paths[0]] = numbers(setting(paths[0], i))[0]
-                else:  # a section, or what a default says
-                    flat = {path: value for path, value in flat.items() if path.split(".")[0] != fault.path[0]}
+                flat = _mended(flat, fault, i)
     return shipped()[base], load_config(nested(shipped()[base]))
+
+
+def _mended(flat: Flat, fault: Fault, number: int) -> Flat:
+    """The configuration without the key that a fault names; or with the one that is missing; or without its section."""
+    paths = [".".join(map(str, fault.path[:k])) for k in range(len(fault.path), 0, -1)]
+    if found := [path for path in paths if path in flat]:
+        return {path: value for path, value in flat.items() if path != found[0]}
+    if fault.message.startswith("missing"):
+        return flat | {paths[0]: numbers(setting(paths[0], number))[0]}
+    return {path: value for path, value in flat.items() if path.split(".")[0] != fault.path[0]}
 
 
 def in_yaml(flat: Flat) -> str:
@@ -237,9 +242,10 @@ def bases(pool: set[Piece]) -> list[Flat]:
     for flat, model in product(shipped().values(), TIERS):
         there, config = accepted(flat | {"model": model})
         unit = 1.0 if config.units == PAPER_UNITS else float(np.sqrt(config.grid.columns()["c"].max() / 9.8))
+        t_end = round(300 * unit, 1)
         for method, name, specs in sorted({(AUTO, *piece[1:]) for piece in pool} | pool):
-            of_pool = {"measure": written(specs), "integrator.method": method, "integrator.t_end": round(300 * unit, 1)}
             if (model, name) == (config.model, config.tier.name):
+                of_pool = {"measure": written(specs), "integrator.method": method, "integrator.t_end": t_end}
                 ours, config = accepted(there | of_pool)
                 if kernels(config) <= pool:
                     found.append(ours)
@@ -249,23 +255,40 @@ def bases(pool: set[Piece]) -> list[Flat]:
 def scene(base: Flat, changes: Draws, pool: set[Piece]) -> tuple[Flat, Config]:
     """A configuration with each change that the kernels of the pool can run, and no more cells or steps than usual."""
     flat, config = accepted(base)
-    for path, number in changes:
-        own = [config.table[name].path for name in config.tier.parameters]
-        if path in PHYSICAL and path not in own and number % 4:  # one of another body
-            path = own[number % len(own)]
-        changed, new = accepted(flat | {path: setting(path, number, config.units)})
-        if new.samples and new.samples > 5:  # as many as by default
-            changed, new = accepted(changed | {"samples": 2 + number % 3})
+    for drawn, number in changes:
+        path = _mostly_own(drawn, number, config)
+        changed, new = _with_few_samples(*accepted(flat | {path: setting(path, number, config.units)}), number)
         if path in changed and new.simulated and kernels(new) <= pool:
             flat, config = changed, new
+    return _shortened(*_thinned(flat, config))
+
+
+def _mostly_own(path: str, number: int, config: Config) -> str:
+    """A key; three times of four one that the model has, in the place of a parameter that it has not."""
+    own = [config.table[name].path for name in config.tier.parameters]
+    return own[number % len(own)] if path in PHYSICAL and path not in own and number % 4 else path
+
+
+def _with_few_samples(flat: Flat, config: Config, number: int) -> tuple[Flat, Config]:
+    """The same with 2 to 4 samples, if they are as many as by default."""
+    many = config.samples and config.samples > 5
+    return accepted(flat | {"samples": 2 + number % 3}) if many else (flat, config)
+
+
+def _thinned(flat: Flat, config: Config) -> tuple[Flat, Config]:
+    """The same with shorter axes, the shortest first, until it has no more cells than usual."""
     while config.grid.size > MOST_CELLS:
         longer = [name for name, values in config.axes.items() if len(values) > 1]
         axis = min(longer, key=lambda name: len(config.axes[name]))
         flat, config = accepted(flat | {config.table[axis].path: list(config.axes[axis][:-1])})
-    if (all_ := steps(config)) > MOST_STEPS:
-        shorter = float(f"{config.integrator.t_end * MOST_STEPS / all_:.2g}")
-        flat, config = accepted(flat | {"integrator.t_end": shorter})
     return flat, config
+
+
+def _shortened(flat: Flat, config: Config) -> tuple[Flat, Config]:
+    """The same until an earlier time, if it takes more steps than usual."""
+    if (number := steps(config)) <= MOST_STEPS:
+        return flat, config
+    return accepted(flat | {"integrator.t_end": float(f"{config.integrator.t_end * MOST_STEPS / number:.2g}")})
 
 
 def written(specs: Iterable[str]) -> list[Any]:

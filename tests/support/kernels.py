@@ -86,7 +86,7 @@ def threads(number: int) -> Iterator[None]:
 
 # The longest first.
 SHARED = [
-    ("adams", "slip", default_measures("slip")),
+    ("adams", "slip", (*default_measures("slip"), "estimate")),
     ("dopri5", "slip", default_measures("slip")),
     ("adams", "slip", ("reversals", "reversal_times=3")),
     ("dopri5", "noslip", default_measures("noslip")),
