@@ -143,16 +143,6 @@ def test_a_log_reports_now_and_then_how_far_a_run_is(monkeypatch: pytest.MonkeyP
 ONE = "name: odd\nfriction: {mu: 60}\nintegrator: {t_end: 30}\n"
 
 
-def test_an_axis_of_any_parameter_is_drawn(write: Write, tmp_path: Path) -> None:
-    for axis in ("c=[1,2]", "a=[9,10]", "b=[2,3,4,5,6]", "delta=[0.01,0.03]"):
-        result = invoke("run", write(ONE), "--output", tmp_path / axis[0], "--set", axis, "--set", "n0=[0.04,0.05]")
-        assert result.exit_code == 0
-        assert (tmp_path / axis[0] / "odd.png").exists()
-    for variable in ("n_c1", "form_factor", "energy_error", "step_rule"):
-        assert invoke("plot", tmp_path / "b" / "odd.nc", "--variable", variable).exit_code == 0
-        assert (tmp_path / "b" / f"odd_{variable}.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_step_fixed_for_another_method_is_not_used_by_dopri5(write: Write) -> None:
     config = sweep.load_config(write(ONE), {"method": "adams", "step": 0.1, "mu": 400.0})
     series = trajectory(config)

@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 from support.cli import invoke, refused
 from support.figures import constants, entries, made, maps
 
+import sweep
 from sweep.config import InputError
 from sweep.kernels.status import DIVERGED, TIME_LIMIT, Doubt
-from sweep.plots import panels, picture, scales
+from sweep.plots import labels, panels, picture, scales
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
 from sweep.results.netcdf import open_dataset, write
@@ -342,6 +343,14 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     refused(invoke("plot", tmp_path / "made.nc", "--vmax", "nan"), "vmax: must be a finite number, not nan")
     result = invoke("plot", tmp_path / "made.nc", "--at", "n0=0.06", "--variable", "nothing")
     assert (result.exit_code, result.stdout) == (2, "")
+
+
+@pytest.mark.parametrize(("name", "values"), [("a", [9, 10, 11]), ("c", [1, 1.5, 2]), ("delta", [0.01, 0.02, 0.03])])
+def test_an_axis_of_any_parameter_is_drawn(name: str, values: list[float]) -> None:
+    found = sweep.predict({"friction": {"mu": 60}}, **{name: values})
+    for variable in ("reversals_predicted", "n_c1", "form_factor"):
+        below = [axes.get_xlabel() for axes in picture.plot(found, variable).axes][-1]
+        assert below == labels.label(found, name)
 
 
 def test_numbers_along_a_further_dimension_get_panels() -> None:

@@ -108,21 +108,47 @@ def test_an_end_of_a_slow_n_c2_is_as_certain_as_one_of_a_fast_one() -> None:
     assert still < outer < inner * 1.0011
 
 
-def searched(reverses: Callable[[float], bool], certain: Callable[[float], bool], width: float) -> tuple[Spin, Places]:
-    """A search whose simulations are replaced by two functions of the spin, and the places that it asks for."""
+def searched(
+    distance: Callable[[float], float | None], certain: Callable[[float], bool] = lambda _: True, width: float = 1e-3
+) -> tuple[Spin, Places]:
+    """A search whose simulations are replaced by two functions of the spin, and the places that it asks for.
+
+    A simulation without a distance has failed.
+    """
     spin, asked = Spin(0, 1.0, width, [float(np.log(1.25**i)) for i in range(9)]), Places()
     while spin.reason is None:
         narrowing, answers = spin.root is not None, []
         for place in spin.wanted():
-            distance, sure = 1.0 if reverses(np.exp(place)) else -1.0, not narrowing or certain(np.exp(place))
-            answers.append(Answer(place, distance, False, False, sure))
+            found, sure = distance(np.exp(place)), not narrowing or certain(np.exp(place))
+            answers.append(Answer(place, np.nan if found is None else found, False, found is None, sure))
             asked.append((place, narrowing))
         spin.learn(answers)
     return spin, asked
 
 
+def beyond(n_c2: float, slower: float = -1.0) -> Callable[[float], float]:
+    """Spins beyond this one reverse."""
+    return lambda n: 1.0 if n > n_c2 else slower
+
+
+@pytest.mark.parametrize(
+    ("distance", "reason"),
+    [
+        (beyond(2.0), Reason.EXISTS),
+        (beyond(0.5), Reason.REVERSES_AT_N_C1),
+        (beyond(9.0), Reason.NOT_FOUND),
+        (beyond(9.0, np.nan), Reason.NOT_SETTLED),
+        (beyond(2.0, np.nan), Reason.NOT_SETTLED),
+        (lambda n: -1.0 if n < 2.0 else None, Reason.FAILED),
+    ],
+)
+def test_a_search_ends_with_a_reason(distance: Callable[[float], float | None], reason: Reason) -> None:
+    """The spins below and beyond n_c2 reverse or not, have not settled, or fail."""
+    assert searched(distance)[0].reason == reason
+
+
 def test_uncertain_counts_leave_a_wide_bracket_around_them() -> None:
-    spin, _ = searched(lambda n: n > 3.4, lambda n: not 3.3 < n < 3.5, 1e-3)
+    spin, _ = searched(beyond(3.4), lambda n: not 3.3 < n < 3.5)
     assert spin.reason == Reason.EXISTS
     low, high = np.exp([spin.root.low, spin.root.high])
     assert 3.25 < low < 3.3
@@ -132,7 +158,7 @@ def test_uncertain_counts_leave_a_wide_bracket_around_them() -> None:
 @pytest.mark.parametrize("certain", [True, False])
 def test_ends_of_the_outward_search_are_simulated_again(certain: bool) -> None:
     """A wide bracket is the one that the outward search finds."""
-    spin, asked = searched(lambda n: n > 2.0, lambda _: certain, 0.5)
+    spin, asked = searched(beyond(2.0), lambda _: certain, 0.5)
     ends = [spin.root.low, spin.root.high]
     assert [place for place, narrowing in asked if narrowing] == ends
     assert spin.reason == (Reason.EXISTS if certain else Reason.NOT_SETTLED)
@@ -169,15 +195,11 @@ def test_friction_alone_makes_a_rattle_grow_at_a_fast_spin(write: Write) -> None
     assert "exists" not in reasons(spins)
 
 
-@pytest.mark.parametrize(
-    ("settings", "reason"),
-    [({"x0": 1.0, "y0": 1.0}, "reverses_at_n_c1"), ({"t_end": 30.0}, "not_settled"), ({"step": 0.5}, "failed")],
-)
-def test_n_c2_that_is_not_known_has_a_reason(settings: dict[str, float], reason: str, write: Write) -> None:
-    """A large rattle turns a slow spin by itself; trajectories are too short; their steps are far too long."""
-    spins = sweep.critical(write(STANDARD), **settings, bracket=0.01)
+def test_a_search_among_failures_has_failed(write: Write) -> None:
+    """Their steps are far too long."""
+    spins = sweep.critical(write(STANDARD), step=0.5, bracket=0.01)
     assert np.isfinite(spins.n_c1_linear).all()
-    assert reasons(spins)[0] == reason
+    assert reasons(spins)[0] == "failed"
     assert np.isnan(spins.n_c2_simulated.sel(sign=1))
 
 
