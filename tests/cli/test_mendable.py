@@ -225,7 +225,6 @@ CUTS: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
     "no spin": (lambda d: d.drop_vars("spin"), "lacks the variable spin; it was cut or averaged"),
     "averaged": (lambda d: d.mean("time", keep_attrs=True), "lacks the variable time and 1 other thing; it was cut"),
     "bare": (lambda d: d.drop_attrs(), "not a dataset of sweep, or sweep_kind was dropped; keep it with"),
-    "of nothing": (lambda d: d.isel(mu=slice(0)), "the axis mu has no values; select at least one"),
 }
 """What may be done to a dataset of trajectories."""
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support import own
 from support.cli import invoke, refused
-from support.own import FADING, PENDULUM
+from support.own import FADING, PENDULUM, ROLLING
 
 import sweep
 from sweep.config import InputError, load_config
@@ -105,12 +105,10 @@ def test_a_broken_file_is_refused_with_its_line(folder: Path, kind: str) -> None
 
 def test_a_theory_that_does_not_hold_is_refused_where_trajectories_would_settle_by_it(folder: Path) -> None:
     """It needs a Jacobian that is quadratic in the spin."""
-    for power, fault in ((2, ""), (4, "broken.py:{line}: the pendulum model: the Jacobian of the rattle is not quadr")):
-        text = PENDULUM.replace("(rate, turning, 2 / 3)", f"(-angle * (1 + rate**{power}), 0.0, -phase)")
-        text = text.replace("SPIN})", "SPIN, LINEAR}), upright=inline(lambda spin: (0.0, spin, 0.0))")
-        text = text.replace("import COUNT", "import LINEAR, COUNT")
+    for power, fault in ((2, ""), (4, "broken.py:{line}: the rolling model: the Jacobian of the rattle is not quadr")):
+        text = ROLLING.replace("rate**2", f"rate**{power}")
         (folder / "broken.py").write_text(text, encoding="utf-8")
-        result = invoke("run", folder / "pendulum.yaml", "--set", "model=broken.py", "--dry-run")
+        result = invoke("run", folder / "pendulum.yaml", "--set", "model=broken.py", "--set", "torque=0.5", "--dry-run")
         assert fault.format(line=line_of(text, "@inline")) in result.stderr
         assert result.exit_code == (2 if fault else 0), result.stderr
 

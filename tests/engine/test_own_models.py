@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 from support import own
-from support.own import FADING, PENDULUM
+from support.own import FADING, PENDULUM, ROLLING
 from support.runs import Heard, same_numbers, settled
 
 import sweep
@@ -133,19 +133,6 @@ def test_workers_need_no_file(few: xr.Dataset, folder: Path, client: distributed
     config = load_config(folder / "pendulum.yaml", FEW)
     (folder / "pendulum.py").unlink()
     same_numbers(sweep.run(config, client=client), few)
-
-
-LATE = 'if columns["torque"].max() > 1.1 and len(columns["torque"]) > 2:\n        raise ValueError("too much")\n    '
-
-ROLLING = PENDULUM.replace("(rate, turning, 2 / 3)", "(-angle * (1 + rate**2), 0.0, -phase)")
-ROLLING = ROLLING.replace("SPIN})", "SPIN, LINEAR}), upright=inline(lambda spin: (0.0, spin, 0.0))")
-ROLLING = ROLLING.replace("import COUNT", "import LINEAR, COUNT").replace("y[1], 0.0", "y[1], 0.5 * y[0] * y[0]")
-ROLLING = ROLLING.replace('columns["angle"], nothing,', 'columns["angle"], columns["torque"],')
-ROLLING = ROLLING.replace("nothing = 0", f"{LATE}nothing = 0", 1)
-"""A rattle that decays as exp(-2 t) in energy, below a spin that it could change by its root at most.
-
-It fails late at high spins: one text for two tests, for each text takes a kernel of its own.
-"""
 
 
 def test_an_error_in_a_worker_names_its_line(folder: Path, threaded: distributed.Client) -> None:

@@ -77,8 +77,6 @@ def test_limits_of_counts_of_any_size_take_no_time(top: float) -> None:
     [
         (lambda d: d.isel(mu=slice(0)), "the axis mu has no values; select at least one"),
         (lambda d: d.assign_coords(mu=d["mu"].astype(str)), "mu are not finite numbers; xarray draws names: dataset"),
-        (lambda d: d.isel(b=0, n0=0).isel(mu=slice(0)), "the axis mu has no values; select at least one"),
-        (lambda d: d.stack(both=("mu", "b")), "the axis both is stacked; unstack it"),
         (lambda d: d.assign_coords(mu=[f"{v:g}" for v in d.mu.values]), "the values of the axis mu are not finite"),
         (lambda d: d[["n_c1"]], "name the variable to draw; choose n_c1"),
         (lambda d: d.assign(reversals=d["reversals"].astype(str)), "variable: the values of reversals are not numbers"),

@@ -12,6 +12,9 @@ SHOWN: dict[str, str] = dict(re.findall(r"```\{code-block\}\n:caption: (\S+)\n\n
 
 PENDULUM, FADING = SHOWN["pendulum.py"], SHOWN["fading.py"]
 
+ROLLING = Path(__file__).with_name("rolling.py").read_text(encoding="utf-8")
+"""A model that offers LINEAR, and fails late at high spins: one text for several tests, for each text is compiled."""
+
 
 def write(folder: Path) -> Path:
     """Write the files to a folder, and return it."""
