@@ -1,4 +1,4 @@
-"""A user's model: a rattle that decays as exp(-2 t) in energy, below a spin that it could change by its root at most."""
+"""A user's model: a rattle that decays as exp(-2 t) in energy, below a spin that it could change by its root."""
 
 # ruff: noqa: ARG001  (the functions of a model have one signature each)
 
