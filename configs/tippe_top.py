@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sweep.jit import inline
-from sweep.models.model import COUNT, ENERGY, SPIN, Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.parameters import Parameter
 
 PARAMETERS = (
@@ -162,7 +162,7 @@ MODEL = Model(
     name="tippe_top",
     summary="a sphere with its centre of mass off its centre, on a plane with viscous friction",
     own_parameters=PARAMETERS,
-    offers=frozenset({COUNT, SPIN, ENERGY}),
+    offers=frozenset({Offer.COUNT, Offer.SPIN, Offer.ENERGY}),
     states=("L1", "L2", "L3", "e1", "e2", "e3", "V1", "V2"),
     spin_state=2,
     constants=Constants,

@@ -17,7 +17,7 @@ from sweep.kernels.measures.reversals import Reversals
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.ladder import analytic, slip, slow
-from sweep.models.model import FORMULAS, LINEAR, REVERSAL_TIME, Columns, Model, Tier
+from sweep.models.model import Columns, Model, Offer, Tier
 from sweep.models.slow.estimate import estimate
 from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
@@ -56,11 +56,13 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     if not isinstance(tier, Model):
         return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
     bodies, place = grid.bodies()
-    ranges = _stable_ranges(tier, bodies.columns()) if LINEAR in tier.offers else np.full((7, bodies.size), np.nan)
+    ranges = (
+        _stable_ranges(tier, bodies.columns()) if Offer.LINEAR in tier.offers else np.full((7, bodies.size), np.nan)
+    )
     n_c1 = ranges[1::-1]
-    if LINEAR in tier.offers or not tier.origin:
+    if Offer.LINEAR in tier.offers or not tier.origin:
         found["n_c1_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan).T
-    if REVERSAL_TIME in tier.offers and any(isinstance(each, ReversalTimes) for each in chosen(measure)):
+    if Offer.REVERSAL_TIME in tier.offers and any(isinstance(each, ReversalTimes) for each in chosen(measure)):
         found["t_first_reversal_predicted"] = _first_reversal(tier, grid.columns(), n_c1[:, place])
     if Estimate.name in measure:
         found |= estimates(tier, grid.columns())
@@ -105,7 +107,7 @@ def decay_times(model: Model, grid: Grid) -> Array:
         return np.divide(-1.0, growth, out=np.zeros((1, len(growth))), where=growth < stability.DECAYS)
 
     bodies, place = grid.bodies()
-    if LINEAR not in model.offers:
+    if Offer.LINEAR not in model.offers:
         return np.zeros(len(place))
     return np.asarray(np.nan_to_num(_in_parts(times, model, bodies.columns(), 1)[0])[place])
 
@@ -134,7 +136,7 @@ def _formulas(tier: Tier, grid: Grid) -> dict[str, Array]:
     bodies, found = grid.of_bodies().columns(), dict[str, Array]()
     if set(bodies) <= PAPER_PARAMETERS.keys() and not (isinstance(tier, Model) and tier.origin):
         found["form_factor"] = analytic.form_factor(bodies)
-    if FORMULAS in tier.offers:
+    if Offer.FORMULAS in tier.offers:
         found["reversals_predicted"] = analytic.reversal_count(grid.columns())
         found["n_c1"] = np.stack(analytic.critical_spins(bodies), axis=1)
         found["n_c2"] = 2 * found["n_c1"]

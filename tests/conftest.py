@@ -121,10 +121,10 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Steps that kernels take from now on, one number for each call."""
     steps, plain = list[float](), Kernel.advance
 
-    def advance(kernel: Kernel, images: np.ndarray, *rest: Any) -> int:
-        before = kernel.table(images)["done"].sum()
-        blocks = plain(kernel, images, *rest)
-        steps.append(kernel.table(images)["done"].sum() - before)
+    def advance(kernel: Kernel, rows: np.ndarray, *rest: Any) -> int:
+        before = kernel.table(rows)["done"].sum()
+        blocks = plain(kernel, rows, *rest)
+        steps.append(kernel.table(rows)["done"].sum() - before)
         return blocks
 
     monkeypatch.setattr(Kernel, "advance", advance)

@@ -38,7 +38,7 @@ def test_error_is_the_largest_difference_from_the_reference(method: str) -> None
     spins.spins[1, 0] += 1e-3
     spins.spins[0, 1] -= 1e-5
     assert spin_errors(kernel, spins, step) == pytest.approx([1e-5, 1e-3], rel=1e-3)
-    if METHODS[method].stable_step:  # a step beyond stability fails
+    if METHODS[method].limited:  # a step beyond stability fails
         assert list(spin_errors(kernel, spins, np.full(2, 0.1))) == [np.inf, np.inf]
 
 
@@ -131,7 +131,7 @@ PLANTED: dict[str | int, tuple[float, float]] = {
     "status": (0, DIVERGED), "v1": (0, np.nan), "reversals": (1, 1), "violation": (0, 1),
     4: (1, 0.01), "failed_at": (0.9, 0),
 }  # fmt: skip
-"""Rows of the images, 4 the spin's, with the factor and the summand by which a bug changes them at the end."""
+"""Indices of quantities, 4 the spin's, with the factor and the summand by which a bug changes them at the end."""
 
 
 def noticed(case: hard.Case) -> set[str | int]:
@@ -151,11 +151,11 @@ def test_hard_cases_hold_and_a_planted_bug_fails_each(monkeypatch: pytest.Monkey
         key = ("step" in options, options["method"])
         if key not in runs:
             runs[key] = simulate(columns, t_end, **options)
-        ends = replace(runs[key], images=runs[key].images.copy())
+        ends = replace(runs[key], rows=runs[key].rows.copy())
         for name in () if "step" in options else planted:
             factor, summand = PLANTED[name]
             row = name if isinstance(name, int) else ends.kernel.layout.index(name)
-            ends.images[:, row] = factor * ends.images[:, row] + summand
+            ends.rows[:, row] = factor * ends.rows[:, row] + summand
         return ends
 
     monkeypatch.setattr(hard, "simulate", spoilt)

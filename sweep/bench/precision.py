@@ -143,7 +143,7 @@ def _affordable(step: Array, effort: Effort) -> int:
 
 def _run(kernel: Kernel, columns: Columns, step: Array) -> None:
     """Run trajectories from their parameters to `T_END`, start-up included."""
-    execute(kernel, kernel.images(columns, step, T_END))
+    execute(kernel, kernel.start(columns, step, T_END))
 
 
 def _spread_out(columns: Columns, count: int) -> dict[str, Array]:

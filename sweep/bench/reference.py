@@ -60,7 +60,7 @@ def comparisons() -> Iterator[tuple[str, str, Spins]]:
     for model, reference in read_spins().items():
         for method in allowed(MODELS[model]):
             mu = reference.columns.get("mu", np.zeros(len(reference.spins)))
-            yield model, method, reference.select((mu <= STEEPEST) | (METHODS[method].stable_step is None))
+            yield model, method, reference.select((mu <= STEEPEST) | (not METHODS[method].limited))
 
 
 def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
@@ -69,7 +69,7 @@ def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:
     Each time needs a separate trajectory, because the steps of adams depend on where it is to end. The error of a
     trajectory that fails is infinite.
     """
-    table = np.concatenate([kernel.images(reference.columns, step, t) for t in reference.times])
+    table = np.concatenate([kernel.start(reference.columns, step, t) for t in reference.times])
     execute(kernel, table)
     spin = kernel.model.energy(*kernel.unpack(table))[0]
     error = np.where(kernel.table(table)["status"] == TIME_LIMIT, np.abs(spin - reference.spins.T.ravel()), np.inf)

@@ -26,7 +26,7 @@ from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.model import ENDING, Model, Tier
+from sweep.models.model import Model, Offer, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.variants import PAPER_LAW, Physics
@@ -237,7 +237,7 @@ def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]
         found["method"] = methods.AUTO if choice else methods.PLAIN
     if "t_end" not in said:
         found["t_end"] = usual = _longest(schema.T_END, in_si)
-        if ENDING in model.offers and ("stop_early" not in said or integrator.first_leg):
+        if Offer.ENDING in model.offers and ("stop_early" not in said or integrator.first_leg):
             found |= {"t_end": _longest(schema.LATER, in_si), "stop_early": integrator.first_leg or usual}
     return Integrator(**{**dict(integrator), **found})
 

@@ -73,9 +73,9 @@ class Cells:
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
     stable: Array
-    """Ranges of spin in which the rattle decays, as `Kernel.images` takes them, shape (7, cells)."""
-    images: Array
-    """Shape (cells, rows)."""
+    """Ranges of spin in which the rattle decays, as `Kernel.start` takes them, shape (7, cells)."""
+    rows: Array
+    """Shape (cells, quantities)."""
 
     @property
     def method(self) -> str:
@@ -83,12 +83,12 @@ class Cells:
 
     def recorded(self, name: str) -> Array:
         """Return a quantity of the state rows, shape (cells,); NaN if the kernel does not record it."""
-        table = self.kernel.table(self.images)
-        return table[name] if name in table.layout else np.full(len(self.images), np.nan)
+        table = self.kernel.table(self.rows)
+        return table[name] if name in table.layout else np.full(len(self.rows), np.nan)
 
     @property
     def status(self) -> Array:
-        return np.asarray(self.kernel.table(self.images)["status"])
+        return np.asarray(self.kernel.table(self.rows)["status"])
 
     @property
     def failed(self) -> Array:
@@ -98,20 +98,20 @@ class Cells:
     @property
     def times(self) -> Array:
         """Return the times in sqrt(c/g) at which the runs ended, shape (cells,)."""
-        return self.kernel.times(self.images, self.rules.t_end)
+        return self.kernel.times(self.rows, self.rules.t_end)
 
     @property
     def inertia(self) -> Array:
         """Return the third part of `Model.energy` at the states of these cells, shape (cells,); NaN for failures."""
         with np.errstate(invalid="ignore", over="ignore"):
-            return np.asarray(self.kernel.model.energy(*self.kernel.unpack(self.images))[2])
+            return np.asarray(self.kernel.model.energy(*self.kernel.unpack(self.rows))[2])
 
-    def take(self, rows: Array, images: Array | None = None) -> Cells:
+    def take(self, which: Array, rows: Array | None = None) -> Cells:
         """Return some of these cells, with their own state rows or with others."""
-        columns = {name: values[rows] for name, values in self.columns.items()}
+        columns = {name: values[which] for name, values in self.columns.items()}
         return replace(
-            self, cells=self.cells[rows], columns=columns, step=self.step[rows], step_rule=self.step_rule[rows],
-            stable=self.stable[:, rows], images=self.images[rows] if images is None else images,
+            self, cells=self.cells[which], columns=columns, step=self.step[which], step_rule=self.step_rule[which],
+            stable=self.stable[:, which], rows=self.rows[which] if rows is None else rows,
         )  # fmt: skip
 
     def start(self, step: Array | None = None, t_end: float | Array | None = None) -> Array:
@@ -120,7 +120,7 @@ class Cells:
             return np.empty((0, len(self.kernel.layout.names)))
         wanted, until = (self.step if step is None else step), (self.rules.t_end if t_end is None else t_end)
         with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method
-            return self.kernel.images(self.columns, wanted, until, self.stable)
+            return self.kernel.start(self.columns, wanted, until, self.stable)
 
 
 class Lives:
@@ -130,8 +130,8 @@ class Lives:
     ----------
     cells : with the state rows that run
     notes : a `Table` with the layout `NOTES`
-    before : state rows of the previous runs, shape (cells, rows)
-    aside : state rows that are set aside, shape (cells, rows)
+    before : state rows of the previous runs, shape (cells, quantities)
+    aside : state rows that are set aside, shape (cells, quantities)
     """
 
     def __init__(self, cells: Cells) -> None:
@@ -141,7 +141,7 @@ class Lives:
         self.notes.set_columns(ERRORS, np.nan)
         self.cells = replace(cells, step=self.notes["step"], step_rule=self.notes["step_rule"])
         # Pages that are never written take no memory.
-        self.before, self.aside = np.zeros_like(cells.images), np.zeros_like(cells.images)
+        self.before, self.aside = np.zeros_like(cells.rows), np.zeros_like(cells.rows)
 
     @property
     def stage(self) -> Array:
@@ -162,37 +162,37 @@ class Lives:
         """Return the indices of cells whose stage has ended."""
         return np.flatnonzero((self.stage != DONE) & ~np.isin(self.cells.status, (RUNNING, QUIET)))
 
-    def table(self, rows: Array) -> Table:
+    def table(self, which: Array) -> Table:
         """Return a copy of some state rows, to be written back."""
-        return self.cells.kernel.table(self.cells.images[rows])
+        return self.cells.kernel.table(self.cells.rows[which])
 
-    def take(self, rows: Array) -> Cells:
+    def take(self, which: Array) -> Cells:
         """Return some cells, with a copy of their state rows."""
-        return self.cells.take(rows)
+        return self.cells.take(which)
 
-    def note(self, rows: Array, names: Sequence[str], values: Array | float) -> None:
-        """Note `values`, of shape (rows, names) or the same for all, for the cells `rows`."""
-        self.notes.images[rows[:, None], np.array([NOTES.index(name) for name in names])] = values
+    def note(self, which: Array, names: Sequence[str], values: Array | float) -> None:
+        """Note `values`, of shape (which, names) or the same for all, for the cells `which`."""
+        self.notes.rows[which[:, None], np.array([NOTES.index(name) for name in names])] = values
 
     def enter(
-        self, rows: Array, stage: int, images: Array, *, settles: Array | bool = False, goal: Array | float = np.inf
+        self, which: Array, stage: int, rows: Array, *, settles: Array | bool = False, goal: Array | float = np.inf
     ) -> None:
-        """Set the state rows of the cells `rows` in a stage: they run to their ends, or for `goal` steps."""
-        table = self.cells.kernel.table(images)
+        """Set the state rows of the cells `which` in a stage: they run to their ends, or for `goal` steps."""
+        table = self.cells.kernel.table(rows)
         table["settles"], table["goal"] = settles, np.minimum(table["steps"], goal)
-        self.cells.images[rows], self.notes["stage"][rows] = images, stage
+        self.cells.rows[which], self.notes["stage"][which] = rows, stage
 
     def saved(self) -> dict[str, Array]:
         """Return everything that an interrupted batch needs to resume, by name."""
-        tables = {"images": self.cells.images, "notes": self.notes.images}
+        tables = {"rows": self.cells.rows, "notes": self.notes.rows}
         tables |= {"before": self.before} if self.notes["halvings"].any() else {}
         tables |= {"aside": self.aside} if np.isin(self.stage, (APPROACH, COMPANION)).any() else {}
         return {f"{self.cells.method} {name}": table for name, table in tables.items()}
 
     def resume(self, saved: dict[str, Array]) -> None:
         """Resume from what `saved` returned, if it is of these cells."""
-        own = {"images": self.cells.images, "notes": self.notes.images, "before": self.before, "aside": self.aside}
+        own = {"rows": self.cells.rows, "notes": self.notes.rows, "before": self.before, "aside": self.aside}
         found = {name: saved[key] for name in own if (key := f"{self.cells.method} {name}") in saved}
-        if all(name in found and found[name].shape == own[name].shape for name in ("images", "notes")):
+        if all(name in found and found[name].shape == own[name].shape for name in ("rows", "notes")):
             for name, table in found.items():
                 own[name][:] = table

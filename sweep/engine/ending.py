@@ -14,11 +14,11 @@ from sweep.engine.cells import RUN, Cells, Lives
 from sweep.grid import Array
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK
-from sweep.kernels.measures.decay import EVERY, LEFT, LOOKS, NEXT, WOUND
+from sweep.kernels.measures.decay import CHECKS, EVERY, LEFT, NEXT, WOUND
 from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models.general import rigid_body, starts
-from sweep.models.model import ENDING, Model
+from sweep.models.model import Model, Offer
 from sweep.models.stiff.modes import bending
 from sweep.models.theory import linear
 from sweep.models.theory.rocking import frequencies
@@ -48,42 +48,42 @@ _WINDS_DOWN = 10.0
 _ROLLS = 0.5
 
 
-def begin(lives: Lives, rows: Array, images: Array) -> None:
-    """Let `images` at t = 0 run to their ends."""
-    rules, table = lives.cells.rules, lives.cells.kernel.table(images)
+def begin(lives: Lives, which: Array, rows: Array) -> None:
+    """Let `rows` at t = 0 run to their ends."""
+    rules, table = lives.cells.rules, lives.cells.kernel.table(rows)
     first = np.inf if rules.first_leg is None else whole_blocks(rules.first_leg / table["step"])
     if rules.settles:
-        watch(lives.take(rows), images)
-    lives.note(rows, ("leg", "wary"), 0)
-    lives.enter(rows, RUN, images, settles=rules.settles, goal=first)
+        watch(lives.take(which), rows)
+    lives.note(which, ("leg", "wary"), 0)
+    lives.enter(which, RUN, rows, settles=rules.settles, goal=first)
 
 
-def over(lives: Lives, rows: Array) -> Array:
-    """Find which of the cells `rows`, which have stopped, are finished; the others continue.
+def over(lives: Lives, which: Array) -> Array:
+    """Find which of the cells `which`, which have stopped, are finished; the others continue.
 
     Returns
     -------
     The indices of their cells.
     """
-    rules, run = lives.cells.rules, lives.take(rows)
-    early = too_early(run, lives.notes["wary"][rows] == 0)
+    rules, run = lives.cells.rules, lives.take(which)
+    early = too_early(run, lives.notes["wary"][which] == 0)
     predicted = settle(run, ~early & rules.settles)
-    first = (lives.notes["leg"][rows] == FIRST) & ~early & (rules.settles and rules.first_leg is not None)
+    first = (lives.notes["leg"][which] == FIRST) & ~early & (rules.settles and rules.first_leg is not None)
     later = first & _late(run) & (predicted | winds_down(run))
-    lives.cells.images[rows] = run.images
-    _go_on(lives, rows[early], settles=False)
-    _go_on(lives, rows[later], settles=True)
-    return np.asarray(rows[~early & ~later])
+    lives.cells.rows[which] = run.rows
+    _go_on(lives, which[early], settles=False)
+    _go_on(lives, which[later], settles=True)
+    return np.asarray(which[~early & ~later])
 
 
-def _go_on(lives: Lives, rows: Array, *, settles: bool) -> None:
-    """Let the cells `rows` run on, to `t_end` if they may settle, and otherwise on the same leg without settling."""
-    table = lives.table(rows)
+def _go_on(lives: Lives, which: Array, *, settles: bool) -> None:
+    """Let the cells `which` run on, to `t_end` if they may settle, and otherwise on the same leg without settling."""
+    table = lives.table(which)
     table["status"], table["settles"] = RUNNING, settles
-    lives.notes["wary"][rows] = not settles
+    lives.notes["wary"][which] = not settles
     if settles:
-        table["goal"], lives.notes["leg"][rows] = table["steps"], LATER
-    lives.cells.images[rows] = table.images
+        table["goal"], lives.notes["leg"][which] = table["steps"], LATER
+    lives.cells.rows[which] = table.rows
 
 
 def too_early(cells: Cells, which: Array | bool = True) -> Array:
@@ -95,22 +95,22 @@ def too_early(cells: Cells, which: Array | bool = True) -> Array:
     was watched.
     """
     settled = which & (cells.status == SETTLED)
-    if ENDING not in cells.kernel.model.offers or not settled.any():
+    if Offer.ENDING not in cells.kernel.model.offers or not settled.any():
         return np.zeros(len(settled), bool)
-    table = cells.kernel.table(cells.images)
+    table = cells.kernel.table(cells.rows)
     left = endings(table, settled).reversals
     wound = cells.recorded(WOUND) > 0
     early, unknown = left > 0, np.flatnonzero(settled & np.isnan(left) & ~wound)
     early[wound] &= _error(cells)[0][wound] < _LARGEST
     if len(unknown):
-        early[unknown] = ~_stays(cells.model, cells.kernel, cells.images[unknown])
+        early[unknown] = ~_stays(cells.model, cells.kernel, cells.rows[unknown])
     return np.asarray(early)
 
 
-def _stays(model: Model, kernel: Kernel, images: Array) -> Array:
+def _stays(model: Model, kernel: Kernel, rows: Array) -> Array:
     """Return where the spin keeps its sign and the rattle decays even at `_REACH` times the predicted change."""
-    constants = kernel.unpack(images)[1]
-    states = kernel.model_states(images)
+    constants = kernel.unpack(rows)[1]
+    states = kernel.model_states(rows)
     spin, _, _ = model.energy(tuple(states), constants)
     farthest = spin + _REACH * (linear.resting_spin(model, constants, states) - spin)
     known = np.isfinite(farthest)
@@ -120,7 +120,7 @@ def _stays(model: Model, kernel: Kernel, images: Array) -> Array:
 
 def _late(cells: Cells) -> Array:
     """Return which cells have reached their time limit and can be shown to have settled, shape (cells,)."""
-    known = ENDING in cells.kernel.model.offers and "reversals" in cells.kernel.measure
+    known = Offer.ENDING in cells.kernel.model.offers and "reversals" in cells.kernel.measure
     return np.asarray((cells.status == TIME_LIMIT) & known)
 
 
@@ -131,7 +131,7 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
     -------
     A mask of the cells with a predictable further reversal, shape (cells,).
     """
-    table, late = cells.kernel.table(cells.images), which & _late(cells)
+    table, late = cells.kernel.table(cells.rows), which & _late(cells)
     if not late.any():
         return late
     left = endings(table, late)
@@ -144,7 +144,7 @@ def settle(cells: Cells, which: Array | bool = True) -> Array:
 
 def _error(cells: Cells) -> tuple[Array, Array]:
     """Return the relative error of the slow equations, and the fastest spin that the energy allows, (cells,)."""
-    fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.images)["energy"], 0) / cells.inertia)
+    fastest = np.sqrt(2 * np.maximum(cells.kernel.table(cells.rows)["energy"], 0) / cells.inertia)
     return np.maximum(_NEGLECTED * bending(cells.model, cells.columns) * fastest**2, _LEAST), fastest
 
 
@@ -153,16 +153,16 @@ def whole_blocks(steps: Array) -> Array:
     return np.asarray(BLOCK * np.ceil(steps / BLOCK))
 
 
-def watch(cells: Cells, images: Array) -> None:
-    """Have `images` of cells at t = 0 watched, in place: from the start if they roll round, or in the last window."""
-    table, first = cells.kernel.table(images), cells.rules.first_leg
+def watch(cells: Cells, rows: Array) -> None:
+    """Have `rows` of cells at t = 0 watched, in place: from the start if they roll round, or in the last window."""
+    table, first = cells.kernel.table(rows), cells.rules.first_leg
     if NEXT not in table.layout or first is None:
         return
     surface = cells.model.variant.surface
     slower, faster = frequencies(rigid_body.rocking(cells.columns, surface))
     rolls = faster - slower < _ROLLS * np.abs(starts.spin(cells.columns, surface))
-    table[EVERY] = every = whole_blocks(_WINDOW * first / (LOOKS * table["step"]))
-    last = whole_blocks(first / table["step"]) - LOOKS * every
+    table[EVERY] = every = whole_blocks(_WINDOW * first / (CHECKS * table["step"]))
+    last = whole_blocks(first / table["step"]) - CHECKS * every
     table[NEXT] = np.where(rolls, 0.0, np.where(last < 0, np.inf, last))
 
 

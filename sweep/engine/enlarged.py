@@ -146,7 +146,7 @@ def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Arra
         at = choice.cells
         left = (t_end - before("t_stop")[at]) / before("step")[at]
         step = config.integrator.t_end / steps_to(config.integrator.t_end, choice.step)
-        depends[at] |= (left <= METHODS[choice.method].foresight) | (step != before("step")[at])
+        depends[at] |= (left <= METHODS[choice.method].horizon) | (step != before("step")[at])
         if "method" in there:
             depends[at] |= before("method")[at] != METHODS[choice.method].code
     return depends

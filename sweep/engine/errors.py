@@ -112,15 +112,15 @@ class Errors(NamedTuple):
         return np.asarray(np.fmax(self.spin, self.least))
 
 
-def accompany(lives: Lives, rows: Array) -> None:
-    """Start the companions of the cells `rows`, setting their own runs aside."""
-    run = lives.take(rows)
-    lives.aside[rows] = run.images
-    lives.enter(rows, COMPANION, companions(run), settles=_ends_by_itself(run))
+def accompany(lives: Lives, which: Array) -> None:
+    """Start the companions of the cells `which`, setting their own runs aside."""
+    run = lives.take(which)
+    lives.aside[which] = run.rows
+    lives.enter(which, COMPANION, companions(run), settles=_ends_by_itself(run))
 
 
-def after_companion(lives: Lives, rows: Array) -> Array:
-    """Estimate the errors of the cells `rows`, whose companions have ended; those above the tolerance run again.
+def after_companion(lives: Lives, which: Array) -> Array:
+    """Estimate the errors of the cells `which`, whose companions have ended; those above the tolerance run again.
 
     A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, at most `ROUNDS` times,
     until the error is below `AIM` times the tolerance.  A cell whose error stays above the tolerance has `missed` it.
@@ -130,29 +130,29 @@ def after_companion(lives: Lives, rows: Array) -> Array:
     The indices of the cells that are not repeated.
     """
     notes, rules, method = lives.notes, lives.cells.rules, METHODS[lives.cells.method]
-    now, other = lives.cells.take(rows, lives.aside[rows]), lives.take(rows)
-    errors, limit, most = compare(now, other), allowed(now), notes["most_error"][rows]
+    now, other = lives.cells.take(which, lives.aside[which]), lives.take(which)
+    errors, limit, most = compare(now, other), allowed(now), notes["most_error"][which]
     shorter = np.fmax((errors.spin / (AIM * limit)) ** (1 / _ORDER), 1.0)
     large = errors.spin > AIM * limit
     by_chance = ~large & (OF_RATTLE * errors.rattle > AIM * limit)
-    shorter = np.where(np.isinf(errors.spin) | by_chance, method.companion, shorter)
+    shorter = np.where(np.isinf(errors.spin) | by_chance, method.longer, shorter)
     hopeless = (shorter > SHORTEST) | (errors.spin > most)
     hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
-    long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.images)["done"] > MOST_STEPS
+    long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.rows)["done"] > MOST_STEPS
     known = ~limited_by_round_off(now)
-    again = (large | by_chance) & known & ~hopeless & ~long & (notes["repeats"][rows] < ROUNDS) & rules.repeats
+    again = (large | by_chance) & known & ~hopeless & ~long & (notes["repeats"][which] < ROUNDS) & rules.repeats
     if not rules.fixed:
-        notes["missed"][rows] = ~again & ((errors.reported > limit) & known | (notes["missed"][rows] > 0))
-    lives.cells.images[rows] = now.images
-    lives.note(rows, ERRORS, stack(errors).T)
-    on = rows[again]
+        notes["missed"][which] = ~again & ((errors.reported > limit) & known | (notes["missed"][which] > 0))
+    lives.cells.rows[which] = now.rows
+    lives.note(which, ERRORS, stack(errors).T)
+    on = which[again]
     notes["most_error"][on] = np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]
     notes["repeats"][on] += 1
     lives.note(on, ERRORS, np.nan)
     notes["step_rule"][on] = REPEAT
     notes["step"][on] /= shorter[again]
     ending.begin(lives, on, lives.take(on).start())
-    return rows[~again]
+    return which[~again]
 
 
 def allowed(part: Cells) -> Array:
@@ -179,7 +179,7 @@ def imbalance(part: Cells) -> Array:
     """
     if "energy_error" not in part.kernel.measure:
         return np.full(len(part.cells), np.inf)
-    table = part.kernel.table(part.images)
+    table = part.kernel.table(part.rows)
     scale = np.sqrt(2 * part.inertia * table["energy_start"])
     return np.asarray(np.divide(table["violation"], scale, out=np.zeros(len(scale)), where=scale > 0))
 
@@ -190,12 +190,12 @@ def companions(part: Cells) -> Array:
     They run as long as the cells, or to their own ends.
     """
     until = np.where(_ends_by_itself(part), part.rules.t_end, part.times)
-    return part.start(part.kernel.table(part.images)["step"] * _ratio(part), until)
+    return part.start(part.kernel.table(part.rows)["step"] * _ratio(part), until)
 
 
 def errors_of(lives: Lives) -> Errors:
     """Return the errors of all cells, as far as known."""
-    table = lives.cells.kernel.table(lives.cells.images)
+    table = lives.cells.kernel.table(lives.cells.rows)
     errors = Errors(*lives.notes.columns(ERRORS).T)
     spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
     return errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin))
@@ -203,7 +203,7 @@ def errors_of(lives: Lives) -> Errors:
 
 def compare(part: Cells, companion: Cells) -> Errors:
     """Compare the cells of `part` with their companions, once all have ended."""
-    kernel, both = part.kernel, (part.images, companion.images)
+    kernel, both = part.kernel, (part.rows, companion.rows)
     table, other = map(kernel.table, both)
     (states, constants), (others, _) = map(kernel.unpack, both)
     with np.errstate(invalid="ignore", over="ignore"):  # the companion may have failed
@@ -231,7 +231,7 @@ def _of_counts(part: Cells, companion: Cells, larger: Array, failed: Array) -> A
     """
     if Reversals.name not in part.kernel.measure:
         return np.full((3, len(failed)), np.nan)
-    table, other = (part.kernel.table(each.images) for each in (part, companion))
+    table, other = (part.kernel.table(each.rows) for each in (part, companion))
     predicted = ends_as_predicted(table) & ~failed
     ours, theirs = last_arc(table, predicted), last_arc(other, predicted)
     # Round-off does not shrink with the step.
@@ -250,12 +250,10 @@ def _least(part: Cells, rattle: Array) -> Array:
 
 def _ratio(part: Cells) -> Array:
     """Return the ratio of the companions' steps to the cells' steps, shape (cells,), within the stability limit."""
-    method, ratio = METHODS[part.method], np.full(len(part.cells), METHODS[part.method].companion)
-    if method.stable_step is None:
-        return ratio
+    method = part.kernel.stepper
     with np.errstate(divide="ignore"):
         stable = _NEARER * method.stable_step(part.model.fastest_decay(part.columns))
-    return np.asarray(np.clip(stable / part.kernel.table(part.images)["step"], _NEARER, ratio))
+    return np.asarray(np.clip(stable / part.kernel.table(part.rows)["step"], _NEARER, method.longer))
 
 
 def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:

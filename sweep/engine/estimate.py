@@ -69,5 +69,5 @@ def _works(config: Config, chosen: tuple[Cells, ...], steps: list[Array], share:
     for each, theirs in zip(chosen, steps, strict=True):
         method = METHODS[each.method]
         work = method.step_cost * relative * (theirs + method.start_up_cost)
-        work *= 1 + 1 / method.companion if config.integrator.estimate_errors else 1
+        work *= 1 + 1 / method.longer if config.integrator.estimate_errors else 1
         yield np.resize(work, round(len(work) * share))

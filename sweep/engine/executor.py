@@ -49,46 +49,47 @@ def keep_busy(
         for each in lives:
             few = len(each.running) < _ENOUGH * threads() * LANES
             if len(each.quiet) >= (1 if few else _TOGETHER):
-                each.cells.kernel.carry(each.cells.images)
+                kernel = each.cells.kernel
+                kernel.stepper.between(kernel, each.cells.rows)
             if len(ended := each.ended) >= (1 if few else _TOGETHER):
                 proceed(each, ended)
-        waiting = [(i, rows) for i, each in enumerate(lives) if len(rows := each.running)]
+        waiting = [(i, which) for i, each in enumerate(lives) if len(which := each.running)]
         if not waiting and all((each.stage == DONE).all() for each in lives):
             return
-        for i, rows in waiting:
-            blocks[i] = _advance(lives[i], rows, blocks[i])
+        for i, which in waiting:
+            blocks[i] = _advance(lives[i], which, blocks[i])
             after_chunk()
             point()
 
 
-def _advance(lives: Lives, rows: Array, blocks: int) -> int:
-    """Advance the cells `rows` by this many blocks in every lane; return how many blocks the next chunk should have."""
-    kernel, images = lives.cells.kernel, lives.cells.images
-    table, began = kernel.table(images), time.perf_counter()
-    left = table["goal"][rows] - table["done"][rows]
+def _advance(lives: Lives, which: Array, blocks: int) -> int:
+    """Advance the cells `which` by so many blocks in every lane; return how many blocks the next chunk should have."""
+    kernel, rows = lives.cells.kernel, lives.cells.rows
+    table, began = kernel.table(rows), time.perf_counter()
+    left = table["goal"][which] - table["done"][which]
     least = max(1, int(blocks * _SHORT / CHUNK_SECONDS))
-    taken = kernel.advance(images, rows[np.argsort(-left, kind="stable")], blocks, least)
-    taken = max(1, taken // min(threads(), len(rows)))
+    taken = kernel.advance(rows, which[np.argsort(-left, kind="stable")], blocks, least)
+    taken = max(1, taken // min(threads(), len(which)))
     return _rescale(taken, time.perf_counter() - began)
 
 
 def execute(
-    kernel: Kernel, images: Array, *, after_chunk: Callable[[], None] = lambda: None, chunk_blocks: int | None = None
+    kernel: Kernel, rows: Array, *, after_chunk: Callable[[], None] = lambda: None, chunk_blocks: int | None = None
 ) -> None:
-    """Advance all unfinished `images`, in place, until every trajectory has ended.
+    """Advance all unfinished `rows`, in place, until every trajectory has ended.
 
     Parameters
     ----------
-    images : state rows, shape (cells, rows)
-    after_chunk : called after each chunk, when `images` is consistent: to report, or stop by raising an exception
+    rows : state rows, shape (cells, quantities)
+    after_chunk : called after each chunk, when `rows` is consistent: to report, or stop by raising an exception
     chunk_blocks : blocks of steps per chunk; by default as many as take about `CHUNK_SECONDS`
     """
-    status = kernel.table(images)["status"]
+    status = kernel.table(rows)["status"]
     blocks = chunk_blocks or 1
     while len(pending := np.flatnonzero(status == RUNNING)):
         chunk_began = time.perf_counter()
-        kernel.advance(images, pending, blocks)
-        kernel.carry(images)
+        kernel.advance(rows, pending, blocks)
+        kernel.stepper.between(kernel, rows)
         if chunk_blocks is None:
             blocks = _rescale(blocks, time.perf_counter() - chunk_began)
         after_chunk()

@@ -76,12 +76,12 @@ def unsound(cells: Cells) -> Array:
     """Return where the energy balance is so wrong that no number of the run can be right, shape (cells,)."""
     if "energy_error" not in cells.kernel.measure:
         return np.zeros(len(cells.cells), bool)
-    table = cells.kernel.table(cells.images)
+    table = cells.kernel.table(cells.rows)
     return np.asarray(~(table["violation"] <= UNSOUND * table["energy_start"]))
 
 
-def look_at(lives: Lives, rows: Array) -> Array:
-    """Examine the finished runs of the cells `rows`; repeat those that failed until the outcome is certain.
+def look_at(lives: Lives, which: Array) -> Array:
+    """Examine the finished runs of the cells `which`; repeat those that failed until the outcome is certain.
 
     A genuine failure gets its status, its time and the spin at that time. If two runs do not meet the same failure, the
     step is halved again, at most `ROUNDS` times, until a run ends soundly. That run replaces the first.  A run that
@@ -92,60 +92,60 @@ def look_at(lives: Lives, rows: Array) -> Array:
     -------
     The indices of the cells whose outcome is now known; the others continue.
     """
-    cells, begun = lives.take(rows), lives.notes["halvings"][rows] > 0
+    cells, begun = lives.take(which), lives.notes["halvings"][which] > 0
     failed = cells.failed
     open_ = begun | failed if cells.rules.fixed else begun | failed | unsound(cells)
-    fresh = rows[open_ & ~begun]
+    fresh = which[open_ & ~begun]
     lives.note(fresh, MET, np.array([RUNNING, 0, 0, 0]))
-    at_start, nothing = _approach(lives, rows[failed]), rows[open_ & ~failed]
+    at_start, nothing = _approach(lives, which[failed]), which[open_ & ~failed]
     concluded = after_approach(lives, at_start), _conclude(lives, nothing, Met.nothing(len(nothing)))
-    return np.concatenate([rows[~open_], *concluded])
+    return np.concatenate([which[~open_], *concluded])
 
 
-def _approach(lives: Lives, rows: Array) -> Array:
+def _approach(lives: Lives, which: Array) -> Array:
     """Rerun failed cells to a few steps ahead of their failures.
 
     Returns
     -------
     The indices of cells that fail so early that there is nothing to rerun.
     """
-    cells = lives.take(rows)
-    goal = cells.kernel.table(cells.images)["done"] - _AHEAD
-    lives.aside[rows] = cells.images
+    cells = lives.take(which)
+    goal = cells.kernel.table(cells.rows)["done"] - _AHEAD
+    lives.aside[which] = cells.rows
     late = goal > 0
-    lives.enter(rows[late], APPROACH, cells.take(late).start(), goal=goal[late])
-    return rows[~late]
+    lives.enter(which[late], APPROACH, cells.take(late).start(), goal=goal[late])
+    return which[~late]
 
 
-def after_approach(lives: Lives, rows: Array) -> Array:
+def after_approach(lives: Lives, which: Array) -> Array:
     """Follow cells from a few steps ahead of a failure, and conclude; returns as `look_at`."""
-    if not len(rows):
-        return rows
-    met, cells = Met.nothing(len(rows)), lives.cells.take(rows, lives.aside[rows])
-    model, table, constants = cells.model, cells.kernel.table(cells.images), cells.model.constants.of(cells.columns)
+    if not len(which):
+        return which
+    met, cells = Met.nothing(len(which)), lives.cells.take(which, lives.aside[which])
+    model, table, constants = cells.model, cells.kernel.table(cells.rows), cells.model.constants.of(cells.columns)
     late = table["done"] > _AHEAD
     begin = np.where(late, cells.times - _AHEAD * table["step"], 0.0)
     states = stack(model.start(cells.columns))
-    states[:, late] = cells.kernel.model_states(lives.cells.images[rows[late]])
+    states[:, late] = cells.kernel.model_states(lives.cells.rows[which[late]])
     stretch = cells.times + _BEYOND * table["step"] - begin
     build([cells.kernel], COMPILED)
-    for first in range(0, len(rows), _AT_A_TIME):
+    for first in range(0, len(which), _AT_A_TIME):
         some = slice(first, first + _AT_A_TIME)
         found = approach(model, states[:, some], take(constants, some), stretch[some])
         met.kind[some], passed, met.spin[some], met.doubt[some] = found
         met.time[some] = begin[some] + passed
         point()
-    lives.cells.images[rows] = cells.images
-    return _conclude(lives, rows, met)
+    lives.cells.rows[which] = cells.rows
+    return _conclude(lives, which, met)
 
 
-def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
-    """Decide the outcome of the cells `rows`, whose runs have `met` something; returns as `look_at`."""
-    notes, now = lives.notes, lives.take(rows)
-    table, rules = now.kernel.table(now.images), now.rules
-    halvings, before = notes["halvings"][rows], Met(*notes.columns(MET)[rows].T)
+def _conclude(lives: Lives, which: Array, met: Met) -> Array:
+    """Decide the outcome of the cells `which`, whose runs have `met` something; returns as `look_at`."""
+    notes, now = lives.notes, lives.take(which)
+    table, rules = now.kernel.table(now.rows), now.rules
+    halvings, before = notes["halvings"][which], Met(*notes.columns(MET)[which].T)
     if rules.fixed:
-        last, within = halvings == 1, notes["step_before"][rows]
+        last, within = halvings == 1, notes["step_before"][which]
     else:
         rounds = np.where(now.failed & ~met.agrees(before, np.inf), FALSE_ROUNDS, ROUNDS)
         last = (halvings >= rounds) | ((halvings > 0) & (2 * table["done"] > MOST_STEPS))
@@ -155,46 +155,46 @@ def _conclude(lives: Lives, rows: Array, met: Met) -> Array:
     over = ~doubtful | last
     # With a fixed step, the run with half the step only confirms.
     back = over & rules.fixed & (halvings > 0)
-    here = rows[over]
-    step, images = now.step[over], now.images[over]
-    step[back[over]], images[back[over]] = notes["step_before"][rows[back]], lives.before[rows[back]]
-    _set_true(lives, here, images, take(met, over), take(before, over), true[over])
+    here = which[over]
+    step, rows = now.step[over], now.rows[over]
+    step[back[over]], rows[back[over]] = notes["step_before"][which[back]], lives.before[which[back]]
+    _set_true(lives, here, rows, take(met, over), take(before, over), true[over])
     notes["step"][here] = step
     if not rules.fixed:
         repeated = halvings[over] > 0
         notes["step_rule"][here[repeated]] = REPEAT
         notes["missed"][here] = doubtful[over] | (~repeated & (notes["missed"][here] > 0))
-    _halve(lives, rows[~over], take(met, ~over))
+    _halve(lives, which[~over], take(met, ~over))
     return np.asarray(here)
 
 
-def deny_unsound(lives: Lives, rows: Array) -> None:
-    """Mark cells of `rows` as diverged if their energy balance is wrong, although they did not fail."""
-    cells = lives.take(rows)
-    wrong = rows[unsound(cells) & ~cells.failed]
-    lives.cells.kernel.table(lives.cells.images)["status"][wrong] = DIVERGED
+def deny_unsound(lives: Lives, which: Array) -> None:
+    """Mark cells of `which` as diverged if their energy balance is wrong, although they did not fail."""
+    cells = lives.take(which)
+    wrong = which[unsound(cells) & ~cells.failed]
+    lives.cells.kernel.table(lives.cells.rows)["status"][wrong] = DIVERGED
 
 
-def _set_true(lives: Lives, rows: Array, images: Array, met: Met, before: Met, true: Array) -> None:
-    """Set `images`, with final statuses, as the state rows of the cells `rows`.
+def _set_true(lives: Lives, which: Array, rows: Array, met: Met, before: Met, true: Array) -> None:
+    """Set `rows`, with final statuses, as the state rows of the cells `which`.
 
     A failure that is not `true` is an artefact of the integration. `before` holds what the runs with steps of twice the
     length have met.
     """
-    table, method = lives.cells.kernel.table(images), METHODS[lives.cells.method]
+    table, method = lives.cells.kernel.table(rows), METHODS[lives.cells.method]
     error = np.maximum(np.abs(met.spin - before.spin) / (2**method.error_order - 1), met.doubt)
     failed = np.isin(table["status"], FAILURES)
     table["status"] = np.where(true, met.kind, np.where(failed, DIVERGED, table["status"]))
     for name, values in zip(FAILURE, (met.time, met.spin, error), strict=True):
         table[name] = np.where(true, values, 0.0)
-    lives.cells.images[rows], lives.notes["halvings"][rows] = images, 0
+    lives.cells.rows[which], lives.notes["halvings"][which] = rows, 0
 
 
-def _halve(lives: Lives, rows: Array, met: Met) -> None:
-    """Rerun the cells `rows` with half the step."""
-    notes, now = lives.notes, lives.take(rows)
-    lives.note(rows, MET, stack(met).T)
-    notes["halvings"][rows] += 1
-    notes["step_before"][rows], lives.before[rows] = now.step, now.images
-    notes["step"][rows] = now.step / 2
-    ending.begin(lives, rows, lives.take(rows).start())
+def _halve(lives: Lives, which: Array, met: Met) -> None:
+    """Rerun the cells `which` with half the step."""
+    notes, now = lives.notes, lives.take(which)
+    lives.note(which, MET, stack(met).T)
+    notes["halvings"][which] += 1
+    notes["step_before"][which], lives.before[which] = now.step, now.rows
+    notes["step"][which] = now.step / 2
+    ending.begin(lives, which, lives.take(which).start())

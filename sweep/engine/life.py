@@ -23,7 +23,7 @@ def begin(parts: Sequence[Cells]) -> list[Lives]:
     lives = [Lives(part) for part in parts]
     for each in lives:
         every = np.arange(len(each.cells.cells))
-        ending.begin(each, every, each.cells.images.copy())
+        ending.begin(each, every, each.cells.rows.copy())
     return lives
 
 
@@ -32,11 +32,11 @@ def live(lives: Sequence[Lives], after_chunk: Callable[[], None] = lambda: None)
     keep_busy(lives, proceed, after_chunk)
 
 
-def proceed(lives: Lives, rows: Array) -> None:
-    """Move the cells `rows`, whose stages have ended, to their next stages."""
-    stage = lives.stage[rows]
-    over = ending.over(lives, rows[stage == RUN])
-    known = [failures.look_at(lives, over), failures.after_approach(lives, rows[stage == APPROACH])]
+def proceed(lives: Lives, which: Array) -> None:
+    """Move the cells `which`, whose stages have ended, to their next stages."""
+    stage = lives.stage[which]
+    over = ending.over(lives, which[stage == RUN])
+    known = [failures.look_at(lives, over), failures.after_approach(lives, which[stage == APPROACH])]
     run = np.concatenate(known)
     failures.deny_unsound(lives, run)
     failed = lives.take(run).failed
@@ -45,7 +45,7 @@ def proceed(lives: Lives, rows: Array) -> None:
         errors.accompany(lives, sound)
     else:
         done.append(sound)
-    done.append(errors.after_companion(lives, rows[stage == COMPANION]))
+    done.append(errors.after_companion(lives, which[stage == COMPANION]))
     lives.notes["stage"][np.concatenate(done)] = DONE
 
 
@@ -58,9 +58,9 @@ def progress(lives: Sequence[Lives]) -> tuple[float, int]:
     done, left = 0.0, 0.0
     for each in lives:
         kernel, stage = each.cells.kernel, each.stage
-        now, before = kernel.table(each.cells.images), kernel.table(each.aside)["done"]
+        now, before = kernel.table(each.cells.rows), kernel.table(each.aside)["done"]
         first = np.isin(stage, (RUN, APPROACH))
-        again = 1 / METHODS[each.cells.method].companion if each.cells.rules.twice else 0.0
+        again = 1 / METHODS[each.cells.method].longer if each.cells.rules.twice else 0.0
         ended = np.where(stage == COMPANION, before, now["done"])[~first]
         usual = np.maximum(ended.mean() if len(ended) else now["goal"][first].mean(), now["done"][first])
         done += now["done"].sum() + before[stage == COMPANION].sum() + again * now["done"][stage == DONE].sum()

@@ -51,7 +51,7 @@ class Plan:
         size = sum(grid.size for grid in self.grids)
         arrays: dict[str, Array] = {}
         for part in self.parts:
-            found = dataset.measured(part.kernel, part.images, self.config.integrator.t_end)
+            found = dataset.measured(part.kernel, part.rows, self.config.integrator.t_end)
             found["step_rule"] = part.step_rule
             if self.config.integrator.method == AUTO:
                 found["method"] = np.full(len(part.cells), METHODS[part.method].code)
@@ -83,7 +83,7 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
     stable = np.concatenate([each.ranges for each in predictions], axis=1)
     parts = [replace(each, stable=stable[:, each.cells]) for each in chosen]
-    return Plan(config, grids, predictions, tuple(replace(part, images=part.start()) for part in parts))
+    return Plan(config, grids, predictions, tuple(replace(part, rows=part.start()) for part in parts))
 
 
 def kernels(config: Config, chosen: Sequence[Cells] = ()) -> list[Kernel]:

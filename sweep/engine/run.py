@@ -136,7 +136,7 @@ def _kept(result: Whole, store: Store, running: Running | None) -> str:
     """Say how far an earlier run got."""
     grid = result.simulated().grid
     finished = sum(grid.part(tile).size for i, tile in enumerate(result.tiles) if i in store.done)
-    started = sum(len(table) for name, table in running.tables.items() if name.endswith("images")) if running else 0
+    started = sum(len(table) for name, table in running.tables.items() if name.endswith("rows")) if running else 0
     more = f", {started} under way" if running else ""
     return f"resuming an earlier run: {finished} of {grid.size} cells finished{more}"
 

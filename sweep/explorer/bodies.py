@@ -20,7 +20,7 @@ from sweep.grid import Array
 from sweep.jit import all_threads
 from sweep.kernels import measures
 from sweep.kernels.status import IMPOSSIBLE, SETTLED
-from sweep.models.model import ENDING
+from sweep.models.model import Offer
 from sweep.plots import labels
 from sweep.prediction import estimates
 
@@ -80,7 +80,7 @@ def can_change(setup: Setup | None, source: Source) -> Cell:
 
     They are constant in the dataset, and not zero, which gives a slider no scale.
     """
-    if not setup or ENDING not in setup.config.equations.offers or not set(source.dims) <= set(setup.base):
+    if not setup or Offer.ENDING not in setup.config.equations.offers or not set(source.dims) <= set(setup.base):
         return {}
     return {name: value for name, value in setup.base.items() if name not in source.dims and value}
 

@@ -1,7 +1,7 @@
 """Compile the pieces of kernels into the cache, side by side, each in its own process.
 
 The arguments of such a process are PIECE METHOD MODEL [MEASURE …]. A PIECE is `kernel`, or another part that runs need:
-`images` and `endings`, `path` for single trajectories, `approach` once a trajectory has failed, and `exchange` and
+`beginning` and `endings`, `path` for single trajectories, `approach` once a trajectory has failed, and `exchange` and
 `follow` for estimated counts. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line
 of standard input.
 
@@ -33,7 +33,7 @@ from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
 from sweep.models import find
-from sweep.models.model import ENDING, Model
+from sweep.models.model import Model, Offer
 from sweep.models.origin import Origin
 from sweep.models.slow.estimate import compiled_exchange, compiled_follow
 from sweep.models.stiff.final_spin import compiled_following
@@ -43,13 +43,13 @@ from sweep.models.user.blame import blamed
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and the origin of the model."""
 
-KERNEL, IMAGES, ENDINGS, PATH, APPROACH = "kernel", "images", "endings", "path", "approach"
+KERNEL, BEGINNING, ENDINGS, PATH, APPROACH = "kernel", "beginning", "endings", "path", "approach"
 _EXCHANGE, _FOLLOW = "exchange", "follow"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
-    IMAGES: lambda kernel: kernel.stepper.filling(),
-    ENDINGS: lambda kernel: (compiled_following(),) if ENDING in kernel.model.offers else (),
+    BEGINNING: lambda kernel: kernel.stepper.prepared_by(kernel.model),
+    ENDINGS: lambda kernel: (compiled_following(),) if Offer.ENDING in kernel.model.offers else (),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     APPROACH: lambda kernel: (compiled_approach(kernel.model),),
     _EXCHANGE: lambda kernel: (compiled_exchange(kernel.model),),
@@ -57,14 +57,14 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {IMAGES: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
+_SECONDS = {BEGINNING: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _DOES_NOT_COMPILE = 3
 """Exit code of a process that prints the places and the reason of a `CompileError`."""
 
 _POLL = 0.05
-"""Time in seconds between two looks at the processes."""
+"""Time in seconds between two checks of the processes."""
 
 
 def build(kernels: Iterable[Kernel], *also: str) -> None:
@@ -122,14 +122,14 @@ def try_compiling(model: Model) -> None:
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
     estimated = [_EXCHANGE, _FOLLOW] if Estimate.name in kernel.measure else []
-    return _lacking(kernel, (*estimated, KERNEL, IMAGES, ENDINGS, *also))
+    return _lacking(kernel, (*estimated, KERNEL, BEGINNING, ENDINGS, *also))
 
 
 def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]:
     """List those of `pieces` that the cache lacks, as arguments of this module."""
     for piece in pieces:
         if any(function.is_missing() for function in _PIECES[piece](kernel)):
-            method = kernel.method if piece in (KERNEL, IMAGES) else PLAIN
+            method = kernel.method if piece in (KERNEL, BEGINNING) else PLAIN
             measure = (each.spec for each in kernel.measurements if each.in_kernel and piece == KERNEL)
             yield piece, method, kernel.model.key, *measure
 

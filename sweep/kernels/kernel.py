@@ -1,8 +1,8 @@
 """Define what the kernels of all methods share: many trajectories advance side by side, each to its own end.
 
-The whole state of a trajectory is its *image*, one row of a table: states, constants, step, progress and
+Everything about a trajectory is in its *state row*, one row of a table: states, constants, step, progress and
 measurements.  `advance` takes a table and a list of unfinished cells, and advances each cell by a number of
-blocks of steps.  Nothing is kept outside the table, so writing it to disk makes a checkpoint.  Every image
+blocks of steps.  Nothing is kept outside the table, so writing it to disk makes a checkpoint.  Every row
 evolves by itself, block after block, so the numbers cannot depend on which thread, group, lane or call
 handled a cell.
 """
@@ -10,15 +10,16 @@ handled a cell.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, any_true, call_all, make_load
-from sweep.kernels.lanes import make_advance, make_look
+from sweep.kernels.lanes import make_advance, make_check
 from sweep.kernels.layout import STABLE, Layout, Table, constants_of
-from sweep.kernels.measures.measurement import RIPPLE, Measurement, Step
+from sweep.kernels.measures.measurement import Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 FAILURE = ("failed_at", "failed_spin", "failed_error")
@@ -26,11 +27,11 @@ FAILURE = ("failed_at", "failed_spin", "failed_error")
 there is none."""
 
 _PROGRESS = ("steps", "goal", "settles", "done", "status")
-"""The number of steps to t_end; the number after which the image stops; whether it stops (not zero) as soon as its spin
+"""The number of steps to t_end; the number after which the row stops; whether it stops (not zero) as soon as its spin
 can reverse no more; the number of steps done; and the status."""
 
 _BASE = ("step", "stable_step", *_PROGRESS, "energy_start", "energy", *FAILURE, *STABLE)
-"""Quantities of every image."""
+"""Quantities of every state row."""
 
 STRETCH = 100.0
 """A step divides this time evenly if t_end is a multiple of it, in sqrt(c/g).  So its length does not depend on t_end:
@@ -43,70 +44,129 @@ def steps_to(t_end: float | Array, step: Array) -> Array:
     return np.asarray(np.ceil(stretch / step) * (t_end / stretch))
 
 
+@dataclass(frozen=True, kw_only=True)
 class Stepper:
-    """Base of the classes that take the steps, one for each method (see `sweep.kernels.method`)."""
+    """Base of the methods: how to begin, step and go on without steps; how long steps may be, and what they cost.
 
-    method: str
-    """Its name in `METHODS`."""
-    model: Model
-    """The model in the variables in which it steps."""
+    `sweep.kernels.method` explains how to add one.
+    """
 
-    # Friction only removes energy.  If a body gains more than this share from one look to the next, the
-    # integration has gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5 (together with the
-    # check of failures at a look) caught every spin that was off by more than 1e-4, and none that was right
-    # to 1e-6.
-    energy_gain = 1e-5
+    name: str
+    """As in the configuration."""
+    code: int
+    """The number that stands for it in datasets; it must never change."""
+    summary: str
+    """One line for the documentation."""
+    step_words: str = ""
+    """The limit of an automatic step besides the tolerance, in words for the provenance; "" if there is none."""
+    automatic: bool = False
+    """Whether `method: auto` may choose it.  If so, it changes the numbers of all runs that name no method."""
+    step_cost: float = 1.0
+    """Time of a step of one lane, relative to dopri5 (measure it with `sweep bench`)."""
+    start_up_cost: float = 0.0
+    """Time of the start-up of one trajectory, in steps of this method."""
+    compile_seconds: float = 6.0
+    """Time to compile its kernel, for the estimate of a run (`scripts/LOG.md`: `run_costs`)."""
+    longer: float = 1.5
+    """Ratio of the steps of a second run, which estimates a cell's error, to those of the first
+    (`sweep.engine.errors`)."""
+    error_order: int = 5
+    """The power of the step with which that error is assumed to grow."""
+    least_error: float = 0.0
+    """Lower limit of that error, as a share of the geometric mean of the tolerance and the violation of the energy
+    balance; 0 if that mean says nothing about it."""
+    horizon: float = 0.0
+    """Within this many steps of the time limit the method may take the remaining time into account.  A trajectory that
+    has ended before does not depend on the limit."""
+    takes_every_step: bool = False
+    """Whether it takes equal, independent steps from t = 0 to the end: a run may then stop after any step and continue
+    towards another goal."""
+    limited: bool = False
+    """Whether the limit of stability may set the step."""
+    energy_gain: float = 1e-5
+    """Share by which the energy of a body may seem to grow from one check to the next, although friction only removes
+    energy: beyond it the integration has gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5
+    (together with the check of failures) caught every spin that was off by more than 1e-4, and none that was right to
+    1e-6."""
 
-    def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
-        """Names of the quantities that it adds to an image if the measurements require `follows`."""
+    def runs(self, model: Model) -> bool:
+        """Return whether it can integrate a model; by default it can integrate all."""
+        return True
+
+    def steps_in(self, model: Model) -> Model:
+        """Return a model in the variables in which it steps."""
+        return model
+
+    def accurate_step(
+        self, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float | Array
+    ) -> Array:
+        """Return the step that keeps the error in spin at t = 400 within the tolerance, shape (cells,), in sqrt(c/g).
+
+        Parameters
+        ----------
+        motion, decay : the `fastest_motion` and the `fastest_decay`, shape (cells,)
+        tolerance : for all, or for each, shape (cells,)
+        """
+        raise NotImplementedError
+
+    def stable_step(self, decay: Array) -> Array:
+        """Return the longest stable step, shape (cells,), in sqrt(c/g); infinite unless it is `limited`."""
+        return np.full_like(decay, np.inf)
+
+    def quantities(self, model: Model, *, work: bool) -> tuple[str, ...]:
+        """Return the names of the quantities that it adds to a state row; `work` as of `Kernel`."""
         return ()
 
-    def make_run_block(self, kernel: Kernel):
-        """Compiled (group) -> None: takes `BLOCK` steps of all lanes."""
+    def prepare(self, kernel: Kernel, table: Table, columns: Columns, step: Array, t_end: float | Array) -> None:
+        """Set the number and length of the steps, and what the method adds, in state rows at t = 0.
+
+        Parameters
+        ----------
+        table : the rows, with all other quantities
+        columns, step, t_end : as of `Kernel.start`
+        """
         raise NotImplementedError
 
-    def images(
-        self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
-    ) -> Array:
-        """The images of `Kernel.images`, made with the help of `Kernel.start`."""
+    def prepared_by(self, model: Model) -> tuple[Cached, ...]:
+        """Return the compiled functions that `prepare` calls."""
+        return ()
+
+    def body(self, kernel: Kernel):
+        """Make the compiled function (group, packs) that takes `BLOCK` steps of the lanes of the first packs."""
         raise NotImplementedError
 
-    def carry(self, kernel: Kernel, images: Array) -> None:
-        """Advance the images that are `QUIET` to where steps are needed again.  By default no image is ever quiet."""
+    def between(self, kernel: Kernel, rows: Array) -> None:
+        """Advance the rows that are `QUIET` to where steps are needed again.  By default no row is ever quiet."""
 
     def reached(self, table: Table, t_end: float | Array) -> Array:
-        """Times of the states, shape (cells,)."""
+        """Return the times of the states, shape (cells,)."""
         return np.asarray(table["done"] * t_end / table["steps"])
 
-    def model_states(self, states: Array, constants: Any) -> Array:
-        """The states as the right-hand side of the model takes them, shape (states, cells)."""
+    def model_states(self, model: Model, states: Array, constants: Any) -> Array:
+        """Return the states as the right-hand side of the model takes them, shape (states, cells)."""
         return states
-
-    def filling(self) -> tuple[Cached, ...]:
-        """The compiled functions that `images` calls."""
-        return ()
 
 
 class Kernel:
-    """Combine a model, its measurements and a stepper: the layout of the images, and the compiled loop around a block.
+    """Combine a model, its measurements and a stepper: the layout of the state rows, and the compiled loop.
 
     Attributes
     ----------
     measure : the specs of the measurements
-    follows : which of `WORK` and `RIPPLE` the measurements need in each step
+    work, ripple : whether a measurement needs the work of friction, or the ripple-free spin, in each step
     constants : names of the quantities that hold the constants of the model
     advancing : the compiled function behind `advance`
     """
 
-    def __init__(self, stepper: Stepper, measurements: Sequence[Measurement]) -> None:
-        self.stepper, self.model, self.measurements = stepper, stepper.model, tuple(measurements)
-        self.method, self.measure = stepper.method, tuple(each.spec for each in measurements)
-        self.follows = frozenset[str]().union(*(each.follows for each in measurements))
+    def __init__(self, stepper: Stepper, model: Model, measurements: Sequence[Measurement], tolerance: float) -> None:
+        self.stepper, self.model, self.measurements = stepper, stepper.steps_in(model), tuple(measurements)
+        self.tolerance, self.method, self.measure = tolerance, stepper.name, tuple(each.spec for each in measurements)
+        self.work, self.ripple = (any(getattr(each, name) for each in measurements) for name in ("work", "ripple"))
         self.constants = constants_of(self.model)
-        self._ripple = self.model.ripple if RIPPLE in self.follows else NO_RIPPLE
+        self._ripple = self.model.ripple if self.ripple else NO_RIPPLE
         self._ripples = tuple(f"ripple.{name}" for name in self._ripple.names)
         measured = (name for each in measurements for name in each.quantities)
-        more = stepper.quantities(self.follows)
+        more = stepper.quantities(self.model, work=self.work)
         self.layout = Layout(
             (*self.model.states, *self.constants, *_BASE, *self._ripples, *measured, *more), self.model
         )
@@ -115,15 +175,15 @@ class Kernel:
     def _make_advancing(self) -> Cached:
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self.hooks("make_may_settle"))
         shown = any_true("shown", "group, lane", self.hooks("make_settled"))
-        measure = call_all("measure", "group, lane, seen", self.hooks("make_look"))
-        look = make_look(self.model, self.layout, may_settle, shown, measure, self.stepper.energy_gain)
-        advance = make_advance(self.stepper.make_run_block(self), look, self.layout)
+        measure = call_all("measure", "group, lane, seen", self.hooks("make_check"))
+        check = make_check(self.model, self.layout, may_settle, shown, measure, self.stepper.energy_gain)
+        advance = make_advance(self.stepper.body(self), check, self.layout)
         measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
         name = f"{self.model.key}-{self.method}-{measured}"
         return parallel(advance, "(f8[:, ::1], i8[::1], i8, i8, i8, i8[::1])", name)
 
     def make_watch(self):
-        """Inline (group, lane, accepted, y, p, spin, work, h, now): the work of all measurements after a step.
+        """Inline (group, lane, accepted, y, p, spin, work, h, now): what all measurements do after a step.
 
         y, p, spin : states, constants and spin before the step; the others as in `Step`
         """
@@ -142,12 +202,12 @@ class Kernel:
         """The functions that a hook of `Measurement` returns; `more` are its arguments besides the layout."""
         return [hook for each in self.measurements if (hook := getattr(each, make)(self.layout, *more))]
 
-    def table(self, images: Array) -> Table:
-        """`images`, accessed by the names of their quantities."""
-        return Table(images, self.layout)
+    def table(self, rows: Array) -> Table:
+        """Return `rows`, accessed by the names of their quantities."""
+        return Table(rows, self.layout)
 
-    def images(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
-        """Images of trajectories at t = 0, shape (cells, quantities).
+    def start(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
+        """Return the state rows of trajectories at t = 0, shape (cells, quantities).
 
         Parameters
         ----------
@@ -158,20 +218,11 @@ class Kernel:
             next range below, and the next above, and the share in `STABLE`; shape (7, cells).  NaN where there is none;
             by default there is none anywhere
         """
-        return self.stepper.images(self, columns, step, t_end, stable)
-
-    def start(
-        self, columns: Columns, step: Array, goal: Array, stable_step: Array | bool, stable: Array | None
-    ) -> Array:
-        """Images at t = 0, with all quantities set that do not start at zero, except those of the method."""
         states, constants = stack(self.model.start(columns)), self.model.constants.of(columns)
-        images = np.zeros((len(step), len(self.layout.names)))
-        table = self.table(images)
-        images[:, : len(states)] = states.T
+        table = self.table(np.zeros((len(step), len(self.layout.names))))
+        table.set_columns(self.model.states, states.T)
         table.set_columns(self.constants, stack(constants).T)
         spin, rattle, inertia = self.model.energy(states, constants)
-        table["steps"] = table["goal"] = goal
-        table["stable_step"], table["step"] = stable_step, step
         table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
         table.set_columns(STABLE, np.nan if stable is None else stable.T)
         if self._ripples:
@@ -179,10 +230,11 @@ class Kernel:
         for each in self.measurements:
             for name, values in each.start(self.model, columns, rattle).items():
                 table[name] = values
-        return images
+        self.stepper.prepare(self, table, columns, step, t_end)
+        return table.rows
 
-    def advance(self, images: Array, cells: Array, blocks: int, least: int | None = None) -> int:
-        """Advance the trajectories `cells` (indices into `images`), in place.
+    def advance(self, rows: Array, cells: Array, blocks: int, least: int | None = None) -> int:
+        """Advance the trajectories `cells` (indices of `rows`), in place.
 
         Parameters
         ----------
@@ -194,40 +246,36 @@ class Kernel:
         The total number of blocks that the groups of lanes have taken.
         """
         done = np.zeros(threads(), np.int64)
-        self.advancing(images, cells, blocks, blocks if least is None else least, len(done), done)
+        self.advancing(rows, cells, blocks, blocks if least is None else least, len(done), done)
         return int(done.sum())
 
-    def carry(self, images: Array) -> None:
-        """Advance the images that are `QUIET` to where steps are needed again."""
-        self.stepper.carry(self, images)
+    def states(self, rows: Array) -> Array:
+        """Return the states, shape (states, cells)."""
+        return rows[:, : len(self.model.states)].T
 
-    def states(self, images: Array) -> Array:
-        """The states, shape (states, cells)."""
-        return images[:, : len(self.model.states)].T
+    def unpack(self, rows: Array) -> tuple[Array, Any]:
+        """Return the states, shape (states, cells), and the constants by name, each of shape (cells,)."""
+        table = self.table(rows)
+        return self.states(rows), self.model.constants(*(table[name] for name in self.constants))
 
-    def unpack(self, images: Array) -> tuple[Array, Any]:
-        """The states, shape (states, cells), and the constants by name, each of shape (cells,)."""
-        table = self.table(images)
-        return self.states(images), self.model.constants(*(table[name] for name in self.constants))
-
-    def steady_spin(self, images: Array) -> Array:
-        """The ripple-free spin of the images, shape (cells,); the spin itself if no measurement needs the former."""
-        table, (states, constants) = self.table(images), self.unpack(images)
+    def steady_spin(self, rows: Array) -> Array:
+        """Return the ripple-free spin of the rows, shape (cells,); the spin itself if no measurement needs that."""
+        table, (states, constants) = self.table(rows), self.unpack(rows)
         spin, _, _ = self.model.energy(states, constants)
         return np.asarray(spin - self._ripple.value(states, constants, [table[name] for name in self._ripples]))
 
-    def model_states(self, images: Array) -> Array:
-        """The states as the right-hand side of the model takes them, shape (states, cells)."""
-        return self.stepper.model_states(*self.unpack(images))
+    def model_states(self, rows: Array) -> Array:
+        """Return the states as the right-hand side of the model takes them, shape (states, cells)."""
+        return self.stepper.model_states(self.model, *self.unpack(rows))
 
-    def spins(self, images: Array) -> Array:
-        """Spins with which the images have ended, shape (cells,)."""
-        table = self.table(images)
+    def spins(self, rows: Array) -> Array:
+        """Return the spins with which the rows have ended, shape (cells,)."""
+        table = self.table(rows)
         with np.errstate(invalid="ignore", over="ignore"):  # the states of a run that failed
-            spin, _, _ = self.model.energy(*self.unpack(images))
+            spin, _, _ = self.model.energy(*self.unpack(rows))
         return np.where(table["failed_at"] > 0, table["failed_spin"], spin)
 
-    def times(self, images: Array, t_end: float | Array) -> Array:
-        """Times at which the images have ended, in sqrt(c/g), shape (cells,)."""
-        table = self.table(images)
+    def times(self, rows: Array, t_end: float | Array) -> Array:
+        """Return the times at which the rows have ended, in sqrt(c/g), shape (cells,)."""
+        table = self.table(rows)
         return np.where(table["failed_at"] > 0, table["failed_at"], self.stepper.reached(table, t_end))

@@ -1,8 +1,8 @@
-"""The compiled loop of every kernel: lanes, groups, and the look between two blocks.
+"""The compiled loop of every kernel: lanes, groups, and the check between two blocks.
 
 Each thread keeps `LANES` trajectories in one group, transposed so that the values of a quantity in all lanes lie next
 to each other.  A whole step is taken inside the loop over lanes, which LLVM turns into vector instructions.  When
-the trajectory of a lane ends, its image is written back and the lane takes the next cell.
+the trajectory of a lane ends, its state row is written back and the lane takes the next cell.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from sweep.jit import exactly_compiled, full_width, inline
 from sweep.kernels.codegen import make_access, make_rest
 from sweep.kernels.layout import BEYOND, LANES, PACK, STABLE, Layout
-from sweep.kernels.measures.measurement import Look
+from sweep.kernels.measures.measurement import Check
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
-from sweep.models.model import ENERGY, Model, never_decided
+from sweep.models.model import Model, Offer, never_decided
 
 # A trajectory settles only if its rattle could not carry the spin across a limit even with this multiple of its
 # energy.
@@ -31,10 +31,10 @@ MAX_ENERGY = 1e300
 NEGLIGIBLE = 1e-120
 
 
-def make_advance(run_block, look, layout: Layout):
-    """Python function to be compiled: (images, cells, blocks, least, groups, done) -> None, see `Kernel.advance`.
+def make_advance(run_block, check, layout: Layout):
+    """Python function to be compiled: (rows, cells, blocks, least, groups, done) -> None, see `Kernel.advance`.
 
-    `run_block`, (group) -> None, and `look`, (group) -> None, are compiled functions; `done`, of shape (groups,), is
+    `run_block`, (group) -> None, and `check`, (group) -> None, are compiled functions; `done`, of shape (groups,), is
     filled with the blocks that each group has taken.
     """
     from numba import prange
@@ -42,24 +42,24 @@ def make_advance(run_block, look, layout: Layout):
     n_rows, lanes, pack, status, wide = len(layout.names), LANES, PACK, layout.at("status"), full_width()
 
     @exactly_compiled
-    def take(images, cells, position, group, lane, held):
+    def take(rows, cells, position, group, lane, held):
         """Fill a lane with the next cell of this group's share, or leave it idle if there is none."""
         if position < len(cells):
             held[lane] = cells[position]
             for row in range(n_rows):
-                group[row * lanes + lane] = images[held[lane], row]
+                group[row * lanes + lane] = rows[held[lane], row]
         else:
             held[lane] = -1
             group[status + lane] = SETTLED
         return position + 1
 
     @exactly_compiled
-    def release(images, group, lane, held):
+    def release(rows, group, lane, held):
         for row in range(n_rows):
-            images[held[lane], row] = group[row * lanes + lane]
+            rows[held[lane], row] = group[row * lanes + lane]
 
     @exactly_compiled
-    def run_group(images, cells, blocks, least):
+    def run_group(rows, cells, blocks, least):
         wide()
         # An idle lane computes on zeros.  The result is meaningless but harmless: its status keeps it from
         # being stored.
@@ -67,45 +67,45 @@ def make_advance(run_block, look, layout: Layout):
         held = np.full(lanes, -1)
         position = 0
         for lane in range(lanes):
-            position = take(images, cells, position, group, lane, held)
+            position = take(rows, cells, position, group, lane, held)
         at_work = min(lanes, len(cells))
         packs = (at_work + pack - 1) // pack
         block = 0
         while block < blocks:
             run_block(group, packs)
-            look(group)
+            check(group)
             block += 1
             idle = 0
             for lane in range(lanes):
                 if group[status + lane] != RUNNING:
                     if held[lane] >= 0:
-                        release(images, group, lane, held)
-                        position = take(images, cells, position, group, lane, held)
+                        release(rows, group, lane, held)
+                        position = take(rows, cells, position, group, lane, held)
                     idle += held[lane] < 0
             if idle == lanes or (block >= least and idle >= lanes - _AT_WORK * at_work):
                 break
         for lane in range(lanes):
             if held[lane] >= 0:
-                release(images, group, lane, held)
+                release(rows, group, lane, held)
         return block
 
-    def advance(images, cells, blocks, least, groups, done):
+    def advance(rows, cells, blocks, least, groups, done):
         for g in prange(groups):
             wide()
-            done[g] = run_group(images, cells[g::groups].copy(), blocks, least)
+            done[g] = run_group(rows, cells[g::groups].copy(), blocks, least)
 
     return advance
 
 
-def make_look(model: Model, layout: Layout, may_settle, shown, measure, energy_gain: float):
+def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_gain: float):
     """Compiled (group) -> None: checks all lanes between two blocks, and decides which ones end.
 
     Parameters
     ----------
     may_settle : inline (group, lane, spin, at_rest) -> whether all measurements allow the trajectory to settle
     shown : inline (group, lane) -> whether a measurement has shown that the spin can reverse no more
-    measure : inline (group, lane, seen), what the measurements do at a look (see `Measurement.make_look`)
-    energy_gain : share by which the energy of a body may apparently grow from one look to the next
+    measure : inline (group, lane, seen), what the measurements do at a check (see `Measurement.make_check`)
+    energy_gain : share by which the energy of a body may apparently grow from one check to the next
     """
     load_states, load_constants, store_states = make_access(model, layout)
     energy, rest = model.energy, make_rest(len(model.states), model.spin_state)
@@ -116,13 +116,13 @@ def make_look(model: Model, layout: Layout, may_settle, shown, measure, energy_g
     GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP, SETTLES = map(
         layout.at, ("goal", "done", "status", "energy", "stable_step", "settles")
     )  # fmt: skip
-    lanes, allowed, conserved = LANES, 1.0 + energy_gain, ENERGY in model.offers
+    lanes, allowed, conserved = LANES, 1.0 + energy_gain, Offer.ENERGY in model.offers
     wide = full_width()
     pauses = "quiet_energy" in layout
     QUIET_ENERGY, QUIET_AFTER = (layout.at(f"quiet_{name}") if pauses else 0 for name in ("energy", "after"))
 
     @exactly_compiled
-    def look(group):
+    def check(group):
         wide()
         for lane in range(lanes):
             y = load_states(group, lane)
@@ -157,11 +157,11 @@ def make_look(model: Model, layout: Layout, may_settle, shown, measure, energy_g
             )
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
             ended = (status != RUNNING) & (status != QUIET)
-            measure(group, lane, Look(running, ended, spin, rattle, inertia, total))
+            measure(group, lane, Check(running, ended, spin, rattle, inertia, total))
             # The energy of the rattle may be negative: that of the spin is what it would be without rattle.
             store_states(group, lane, bounded & (abs(rattle) < NEGLIGIBLE), rest(y), y)
 
-    return look
+    return check
 
 
 def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: bool):

@@ -1,7 +1,7 @@
-"""Define where the quantities of a trajectory are kept: in the table of images, and in the group of lanes of a thread.
+"""Define where the quantities of a trajectory are: in a table of state rows, and in the group of lanes of a thread.
 
-In the table an image is a row, so that a quantity is a column.  A group is transposed: there a quantity is a row, with
-one value per lane.
+In the table each trajectory has a row, so that a quantity is a column.  A group is transposed: there a quantity is a
+row, with one value per lane.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ LANES = 1 if INTERPRETED else 16
 # A group computes a whole number of packs.
 PACK = 1 if INTERPRETED else 8
 
-# Steps between two looks at a lane.  With 128, looks add 1 % to the cost of a step on the slip model, and a
+# Steps between two checks at a lane.  With 128, checks add 1 % to the cost of a step on the slip model, and a
 # trajectory that has settled runs on for 64 steps on average, out of 10^5.
 BLOCK = 128
 
@@ -35,7 +35,7 @@ BEYOND = 1.5
 
 @dataclass(frozen=True)
 class Layout:
-    """The names of the quantities of an image, in order."""
+    """The names of the quantities of a state row, in order."""
 
     names: tuple[str, ...]
     model: Any = None
@@ -45,7 +45,7 @@ class Layout:
         return name in self.names
 
     def index(self, name: str) -> int:
-        """Index of a quantity: its column in the table of images, and its row in a group."""
+        """Index of a quantity: its column in the table of state rows, and its row in a group."""
         return self.names.index(name)
 
     def at(self, name: str) -> int:
@@ -60,24 +60,24 @@ def constants_of(model: Model) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Table:
-    """Images, accessed by the names of their quantities: `table["spin"]` is a view of shape (cells,)."""
+    """State rows, accessed by the names of their quantities: `table["spin"]` is a view of shape (cells,)."""
 
-    images: Array
+    rows: Array
     """Shape (cells, quantities)."""
     layout: Layout
 
     def __getitem__(self, name: str) -> Array:
-        column: Array = self.images[:, self.layout.index(name)]
+        column: Array = self.rows[:, self.layout.index(name)]
         return column
 
     def __setitem__(self, name: str, values: Array | float) -> None:
-        self.images[:, self.layout.index(name)] = values
+        self.rows[:, self.layout.index(name)] = values
 
     def columns(self, names: Iterable[str]) -> Array:
         """A copy of several quantities, shape (cells, names)."""
-        columns: Array = self.images[:, [self.layout.index(name) for name in names]]
+        columns: Array = self.rows[:, [self.layout.index(name) for name in names]]
         return columns
 
     def set_columns(self, names: Iterable[str], values: Array | float) -> None:
         """Set several quantities to `values`, of shape (cells, names) or one number for all."""
-        self.images[:, [self.layout.index(name) for name in names]] = values
+        self.rows[:, [self.layout.index(name) for name in names]] = values

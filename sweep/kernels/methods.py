@@ -8,13 +8,13 @@ import numpy as np
 
 from sweep.kernels import measures, runge_kutta
 from sweep.kernels.adams import kernel as adams
-from sweep.kernels.kernel import Kernel
-from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Method, Tolerance
+from sweep.kernels.kernel import Kernel, Stepper
+from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Tolerance
 from sweep.kernels.tableau import TABLEAUS
 from sweep.models.model import Array, Columns, Model
 from sweep.models.theory.linear import fastest_motion
 
-METHODS: dict[str, Method] = {method.name: method for method in (*map(runge_kutta.method, TABLEAUS), adams.METHOD)}
+METHODS: dict[str, Stepper] = {method.name: method for method in (*map(runge_kutta.method, TABLEAUS), adams.METHOD)}
 """The first is the plain method, which runs every model."""
 
 PLAIN = next(iter(METHODS))
@@ -50,7 +50,7 @@ def cheapest(model: Model, columns: Columns, tolerance: Tolerance, t_end: float)
 
 def make_kernel(method: str, model: Model, measure: Iterable[str], tolerance: float = TOLERANCE) -> Kernel:
     """The kernel of a method, not compiled yet, for a model and for measurements given by their specs."""
-    return Kernel(METHODS[method].stepper(model, tolerance), measures.complete(measures.chosen(measure), model))
+    return Kernel(METHODS[method], model, measures.complete(measures.chosen(measure), model), tolerance)
 
 
 def automatic_step(
@@ -62,13 +62,11 @@ def automatic_step(
 
 
 def _step(
-    method: Method, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance
+    method: Stepper, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance
 ) -> tuple[Array, Array]:
     with np.errstate(divide="ignore"):
         accurate = method.accurate_step(model, columns, motion, decay, tolerance)
         step = np.minimum(accurate, longest_step(model, columns))
-        if method.stable_step is None:
-            return step, np.full(len(step), ACCURACY)
         stable = method.stable_step(decay)
     return np.minimum(step, stable), np.where(stable < step, STABILITY, ACCURACY)
 

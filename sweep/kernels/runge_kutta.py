@@ -7,38 +7,54 @@ states, as plain assignments, which the compiler keeps in registers.
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels.codegen import make_accept, make_access
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
-from sweep.kernels.layout import BLOCK, PACK
-from sweep.kernels.method import TOLERANCE, Method, Tolerance
+from sweep.kernels.layout import BLOCK, PACK, Table
+from sweep.kernels.method import TOLERANCE, Tolerance
 from sweep.kernels.status import RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model
 
+_STABILITY_SHARE = 0.9
+"""Share of the stability interval that an automatic step uses for the fastest decay."""
 
+
+@dataclass(frozen=True, kw_only=True)
 class RungeKutta(Stepper):
     """The stepper of a tableau, for any model."""
 
-    def __init__(self, model: Model, tableau: Tableau) -> None:
-        self.method, self.model, self.tableau = tableau.name, model, tableau
+    tableau: Tableau
 
-    def images(
-        self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
-    ) -> Array:
-        """As `Kernel.images`; the steps are no longer than `step` and divide `t_end` evenly."""
-        goal = steps_to(t_end, step)
-        stable_step = t_end / goal * self.model.fastest_decay(columns) <= self.tableau.real_stability
-        return kernel.start(columns, t_end / goal, goal, stable_step, stable)
+    def accurate_step(self, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance) -> Array:
+        """As of `Stepper`."""
+        tableau, power = self.tableau, 1 / self.tableau.order
+        step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
+        if not decay.any():
+            return np.asarray(step)
+        # A slip that differs by v for a time 1/λ changes the rattle, of frequency ν, by the share (ν/λ)².
+        spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
+        e = 2 * rattle / inertia
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
+            return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
 
-    def make_run_block(self, kernel: Kernel):
-        """Compiled (group) -> None: takes `BLOCK` steps of all lanes, and calls the measurements after each."""
-        model, layout = self.model, kernel.layout
+    def stable_step(self, decay: Array) -> Array:
+        return np.asarray(_STABILITY_SHARE * self.tableau.real_stability / decay)
+
+    def prepare(self, kernel: Kernel, table: Table, columns: Columns, step: Array, t_end: float | Array) -> None:
+        """Take steps no longer than `step` that divide `t_end` evenly."""
+        table["steps"] = table["goal"] = goal = steps_to(t_end, step)
+        table["step"] = t_end / goal
+        table["stable_step"] = table["step"] * kernel.model.fastest_decay(columns) <= self.tableau.real_stability
+
+    def body(self, kernel: Kernel):
+        model, layout = kernel.model, kernel.layout
         load_states, load_constants, _ = make_access(model, layout)
         step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
         accept = make_accept(model, layout)
@@ -46,7 +62,7 @@ class RungeKutta(Stepper):
         block, pack, wide = BLOCK, PACK, full_width()
 
         @exactly_compiled
-        def run_block(group, packs):
+        def body(group, packs):
             wide()
             for _ in range(block):
                 for lane in range(pack * packs):
@@ -59,7 +75,7 @@ class RungeKutta(Stepper):
                     group[DONE + lane] = done + (1.0 if accepted else 0.0)
                     watch(group, lane, accepted, y, p, spin, work, h, (done + 1.0) * h)
 
-        return run_block
+        return body
 
 
 def make_step(tableau: Tableau, rhs, n_states: int):
@@ -91,38 +107,17 @@ def make_step(tableau: Tableau, rhs, n_states: int):
     return compile_inline("step", "y, p, h", lines, {"rhs": rhs})
 
 
-_STABILITY_SHARE = 0.9
-"""Share of the stability interval that an automatic step uses for the fastest decay."""
-
-
-def method(tableau: Tableau) -> Method:
-    """The record of the method of a tableau."""
-    longest = _STABILITY_SHARE * tableau.real_stability
-    return Method(
+def method(tableau: Tableau) -> RungeKutta:
+    """Return the method of a tableau."""
+    return RungeKutta(
         name=tableau.name,
         code=tableau.code,
         summary=tableau.summary,
-        stepper=lambda model, tolerance: RungeKutta(model, tableau),
-        accurate_step=partial(_accurate_step, tableau),
-        stable_step=lambda decay: np.asarray(longest / decay),
         step_words=f"{_STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
         automatic=tableau.automatic,
         error_order=tableau.order,
         takes_every_step=True,
+        limited=True,
+        tableau=tableau,
     )
-
-
-def _accurate_step(
-    tableau: Tableau, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance
-) -> Array:
-    power = 1 / tableau.order
-    step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
-    if not decay.any():
-        return np.asarray(step)
-    # A slip that differs by v for a time 1/λ changes the rattle, of frequency ν, by the share (ν/λ)².
-    spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
-    e = 2 * rattle / inertia
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
-        return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))

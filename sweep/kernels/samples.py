@@ -1,4 +1,4 @@
-"""Sample the quantity that a film shows, for many trajectories at common instants: no images, no looks, no counts.
+"""Sample the quantity that a film shows, for many trajectories at common instants: no state rows, no checks, no counts.
 
 The steps are dopri5's, and a whole number of them leads from one instant to the next.  The number follows from a cell's
 own step, so that cells with the same step, such as the columns of a Jacobian, differ smoothly, and no cell depends on

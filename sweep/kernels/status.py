@@ -7,7 +7,7 @@ from enum import IntFlag
 # Running, and the ends of a trajectory; `results.dataset` has their names for the user.
 RUNNING, SETTLED, TIME_LIMIT, LIFT_OFF, DIVERGED, PARADOX, TOPPLED = range(7)
 
-# Not an end: the rattle is so small that the kernel's `carry` may be able to do without steps.
+# Not an end: the rattle is so small that the stepper's `between` may be able to do without steps.
 QUIET = 7
 
 IMPOSSIBLE = 8

@@ -15,8 +15,8 @@ Kernels, executor, store and plots then work with it.  `averaged` is a short exa
 The conditions for settling and the displayed series have defaults that add no instruction to a kernel.
 
 A user's model (`sweep.models.user`) may describe any body.  If the body has no steady upright spin, none of its states
-has to vanish: the model does not offer `LINEAR`, gives its `fastest_motion`, and settles where its function `decided`
-says so.
+has to vanish: the model does not offer `Offer.LINEAR`, gives its `fastest_motion`, and settles where its function
+`decided` says so.
 
 `constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
 again at every look.  The linear theory (`sweep.models.theory.linear`) calls `upright` and `rhs`, the latter with
@@ -31,6 +31,7 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -45,15 +46,26 @@ Columns = Mapping[str, Array]
 """Physical parameters by name: arrays of a common shape (cells,)."""
 
 
-COUNT, SPIN, ENERGY, MODES, FORMULAS = "count", "spin", "energy", "modes", "formulas"
-ENDING = "ending"
-LINEAR = "linear"
-REVERSAL_TIME = "reversal_time"
-"""What a model may offer, in this order: a number of reversals; the spin as a function of time; an energy that only
-friction changes; two rocking modes that the linear theory of the slip model describes, which alone change the spin;
-Takano's formulas for the critical spins and the number of reversals; slow equations that predict how a small rattle
-ends, also with a couple that slows the spin; the spins between which a tiny rattle decays, by the eigenvalues of its
-Jacobian, at which trajectories may settle; and Garcia and Hubbard's formula for the time of the first reversal."""
+class Offer(StrEnum):
+    """What a model may offer."""
+
+    COUNT = "count"
+    """A number of reversals."""
+    SPIN = "spin"
+    """The spin as a function of time."""
+    ENERGY = "energy"
+    """An energy that only friction changes."""
+    MODES = "modes"
+    """Two rocking modes that the linear theory of the slip model describes, which alone change the spin."""
+    FORMULAS = "formulas"
+    """Takano's formulas for the critical spins and the number of reversals."""
+    ENDING = "ending"
+    """Slow equations that predict how a small rattle ends, also with a couple that slows the spin."""
+    LINEAR = "linear"
+    """The spins between which a tiny rattle decays, by the eigenvalues of its Jacobian, at which trajectories may
+    settle."""
+    REVERSAL_TIME = "reversal_time"
+    """Garcia and Hubbard's formula for the time of the first reversal."""
 
 
 OWN = "own"
@@ -107,8 +119,8 @@ class Tier:
     """One line for the documentation."""
     parameters: tuple[str, ...] = ()
     """Names of the physical parameters that it depends on; `sweep.parameters` explains them."""
-    offers: frozenset[str]
-    """What it offers, a selection of the names above, such as `COUNT`."""
+    offers: frozenset[Offer]
+    """What it offers."""
     positive: frozenset[str] = frozenset()
     """Parameters by which the model divides, although `sweep.parameters` allows zero."""
     counts: str = "reversals"
@@ -154,7 +166,7 @@ class Model(Tier):
     """(columns) -> period of the slower rocking about upright rest, shape (cells,); infinite if there is none.  The
     spin is averaged over it before its changes of sign are counted."""
     upright: Callable[..., tuple[Any, ...]] = never_upright
-    """(spin) -> the states of steady upright spin without rattle.  A model that does not offer `LINEAR` may
+    """(spin) -> the states of steady upright spin without rattle.  A model that does not offer `Offer.LINEAR` may
     have `fastest_motion` instead."""
     fastest_motion: Callable[[Columns], Array] | None = None
     """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by

@@ -28,17 +28,17 @@ class Ends:
     """Trajectories that have run to their ends."""
 
     kernel: Kernel
-    images: Array
+    rows: Array
     t_end: float
 
     def __getitem__(self, name: str) -> Array:
         """Return a simulated variable of the dataset by name, of shape (cells,)."""
-        return measured(self.kernel, self.images, self.t_end)[name]
+        return measured(self.kernel, self.rows, self.t_end)[name]
 
     @property
     def states(self) -> Array:
         """Return the model's states, of shape (states, cells)."""
-        return self.kernel.states(self.images)
+        return self.kernel.states(self.rows)
 
 
 def standard(**parameters: Any) -> dict[str, Array]:
@@ -84,12 +84,12 @@ def simulate(
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stable = predict(chosen, Grid({}, {}, dict(columns))).ranges
     steps = np.broadcast_to(steps, cells).astype(float)
-    images = kernel.images(columns, steps, t_end, stable)
+    rows = kernel.start(columns, steps, t_end, stable)
     if decide:
         rules = Rules(t_end, tolerance, settles=settle)
-        lives = begin([Cells(kernel, chosen, rules, np.arange(cells), columns, steps, np.zeros(cells), stable, images)])
+        lives = begin([Cells(kernel, chosen, rules, np.arange(cells), columns, steps, np.zeros(cells), stable, rows)])
         live(lives)
-        return Ends(kernel, lives[0].cells.images, t_end)
-    kernel.table(images)["settles"] = settle
-    execute(kernel, images)
-    return Ends(kernel, images, t_end)
+        return Ends(kernel, lives[0].cells.rows, t_end)
+    kernel.table(rows)["settles"] = settle
+    execute(kernel, rows)
+    return Ends(kernel, rows, t_end)

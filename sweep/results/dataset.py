@@ -125,12 +125,12 @@ VARIABLES: dict[str, Variable] = {
 }  # fmt: skip
 
 
-def measured(kernel: Kernel, images: Array, t_end: float | Array) -> dict[str, Array]:
+def measured(kernel: Kernel, rows: Array, t_end: float | Array) -> dict[str, Array]:
     """Return the simulated variables from final state rows, of shape (cells,) or (cells, length)."""
-    table = kernel.table(images)
-    times = kernel.times(images, t_end)
-    result = {"status": table["status"], "spin_final": kernel.spins(images), "t_stop": times, "step": table["step"]}
-    doubts: Array = np.zeros(len(images), int)
+    table = kernel.table(rows)
+    times = kernel.times(rows, t_end)
+    result = {"status": table["status"], "spin_final": kernel.spins(rows), "t_stop": times, "step": table["step"]}
+    doubts: Array = np.zeros(len(rows), int)
     for each in kernel.measurements:
         result |= each.read(table, times)
         doubts |= each.doubts(table)

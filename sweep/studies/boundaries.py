@@ -27,7 +27,7 @@ from sweep.engine.estimate import estimate
 from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED, TIME_LIMIT
-from sweep.models.model import COUNT, ENDING
+from sweep.models.model import Offer
 from sweep.prediction import estimates
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
@@ -64,7 +64,7 @@ def boundaries(config: Config, x: str | None, y: str | None, width: float, devia
 def chosen_axes(config: Config, x: str | None, y: str | None) -> tuple[str, ...]:
     """Return the axes over which boundaries are curves: the named ones, or else the first two, or the only one."""
     require_certain(config)
-    if COUNT not in config.equations.offers:
+    if Offer.COUNT not in config.equations.offers:
         raise config.error(("model",), "does not count reversals, so it has no boundaries")
     long = [name for name, values in config.axes.items() if len(values) > 1]
     for option, name in (("x", x), ("y", y)):
@@ -237,7 +237,7 @@ class Along(Boundaries):
     def _first(self) -> Array:
         """Return the values of the axis, and the middle of each stretch between them with another estimated count."""
         values = self.along.values
-        if ENDING not in self.config.tier.offers:
+        if Offer.ENDING not in self.config.tier.offers:
             return values
         parts = -(-(_PLACES - 1) // (len(values) - 1))
         at = np.arange(parts * (len(values) - 1) + 1)

@@ -30,7 +30,6 @@ from sweep.kernels import path
 from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK
-from sweep.kernels.measures.measurement import RIPPLE
 from sweep.kernels.methods import METHODS, PLAIN
 from sweep.kernels.status import RUNNING, TIME_LIMIT
 from sweep.models import attitude
@@ -147,16 +146,16 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     job = plan(chosen, also=[PATH])
     (part,), (grid,) = job.parts, job.grids
     (each,), kernel, columns = begin([part]), part.kernel, grid.columns()
-    images, steps = each.cells.images, part.step.copy()
+    rows, steps = each.cells.rows, part.step.copy()
     t_end, count = chosen.integrator.t_end, Count(reporter, named(u.TIME, chosen.units) or "of time")
-    count.expect(len(images) * t_end, len(images) * t_end)
+    count.expect(len(rows) * t_end, len(rows) * t_end)
 
     def report() -> None:
-        table = kernel.table(images)
+        table = kernel.table(rows)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
         count.chunk(float(covered), 0)  # companions begin at t = 0 again, which it leaves out
 
-    marks = _run(each.cells, images, report)
+    marks = _run(each.cells, rows, report)
     live([each], report)
     if (each.cells.step != steps).any():
         again = each.cells.start()
@@ -165,8 +164,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     _judge(each.cells)
     ending.settle(each.cells)
     job = replace(job, parts=(each.cells,))
-    times = _times(kernel, images, every or intervals(kernel.model, columns).min())
-    series = _sample(kernel, marks, images, times, kernel.model.turned(columns))
+    times = _times(kernel, rows, every or intervals(kernel.model, columns).min())
+    series = _sample(kernel, marks, rows, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, [each]))
     made = provenance(chosen, time.perf_counter() - count.began, grid.size, of=TRAJECTORY)
     labelled = dataset.label(chosen, grid, found, made)
@@ -225,31 +224,31 @@ Marks = list[Array]
 """Copies of all state rows at some moments of a run, each of shape (trajectories, rows)."""
 
 
-def _run(cells: Cells, images: Array, after_chunk: Callable[[], None] = lambda: None) -> Marks:
-    """Run `images` to their ends, in place, and mark moments between which samples can be taken in parallel."""
-    marks, kernel = [images.copy()], cells.kernel
+def _run(cells: Cells, rows: Array, after_chunk: Callable[[], None] = lambda: None) -> Marks:
+    """Run `rows` to their ends, in place, and mark moments between which samples can be taken in parallel."""
+    marks, kernel = [rows.copy()], cells.kernel
 
     def mark() -> None:
-        marks.append(images.copy())
+        marks.append(rows.copy())
         after_chunk()
 
-    longest = kernel.table(images)["goal"].max() / BLOCK
-    blocks = max(_BLOCKS, int(np.ceil(longest * len(images) / _MARKS)))
-    executor.execute(kernel, images, after_chunk=mark, chunk_blocks=blocks)
-    early, table = ending.too_early(replace(cells, images=images)), kernel.table(images)
+    longest = kernel.table(rows)["goal"].max() / BLOCK
+    blocks = max(_BLOCKS, int(np.ceil(longest * len(rows) / _MARKS)))
+    executor.execute(kernel, rows, after_chunk=mark, chunk_blocks=blocks)
+    early, table = ending.too_early(replace(cells, rows=rows)), kernel.table(rows)
     table["status"][early], table["settles"][early] = RUNNING, False
-    executor.execute(kernel, images, after_chunk=mark, chunk_blocks=blocks)
+    executor.execute(kernel, rows, after_chunk=mark, chunk_blocks=blocks)
     return marks
 
 
 def _judge(cells: Cells) -> None:
     """Give trajectories that reached their time limit the status `SETTLED` if a sweep would have ended them there."""
-    kernel, looked, at_end = cells.kernel, cells.images.copy(), np.flatnonzero(cells.status == TIME_LIMIT)
+    kernel, looked, at_end = cells.kernel, cells.rows.copy(), np.flatnonzero(cells.status == TIME_LIMIT)
     table = kernel.table(looked)
     table["status"][at_end], table["settles"] = RUNNING, True
     kernel.advance(looked, at_end, 1)
-    table["status"][ending.too_early(replace(cells, images=looked))] = TIME_LIMIT
-    kernel.table(cells.images)["status"] = table["status"]
+    table["status"][ending.too_early(replace(cells, rows=looked))] = TIME_LIMIT
+    kernel.table(cells.rows)["status"] = table["status"]
 
 
 def _times(kernel: Kernel, ends: Array, interval: float) -> Array:
@@ -293,10 +292,10 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
                 series[name] = np.full((len(ends), len(times)), np.nan)
             series[name][which[samples], at[samples]] = values
 
-    def look(samples: Array, images: Array) -> None:
-        _go_on(kernel, images, times[at[samples]])
-        states[:, samples] = kernel.states(images)
-        put(_series(kernel, images, angles[which[samples]]), samples)
+    def look(samples: Array, rows: Array) -> None:
+        _go_on(kernel, rows, times[at[samples]])
+        states[:, samples] = kernel.states(rows)
+        put(_series(kernel, rows, angles[which[samples]]), samples)
 
     waiting, most = list[tuple[Array, Array]](), counts.max()
     for i in range(most):
@@ -348,20 +347,20 @@ def _motion(kernel: Kernel, ends: Array, states: Array, which: Array, times: Arr
     }
 
 
-def _go_on(kernel: Kernel, images: Array, times: Array) -> None:
-    """Advance `images` between two steps to their `times`, in place, by one shorter step."""
-    table = kernel.table(images)
+def _go_on(kernel: Kernel, rows: Array, times: Array) -> None:
+    """Advance `rows` between two steps to their `times`, in place, by one shorter step."""
+    table = kernel.table(rows)
     rest = times - table["done"] * table["step"]
     between = np.flatnonzero(rest > _SAME_STEP * table["step"])
     table["step"][between], table["goal"][between] = rest[between], table["done"][between] + 1
     table["status"][between] = RUNNING
-    kernel.advance(images, between, UNTIL_ALL_STOP)
+    kernel.advance(rows, between, UNTIL_ALL_STOP)
 
 
-def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
-    """Return the series at the samples `images`, each of shape (samples,); `angles` are those of `Model.turned`."""
+def _series(kernel: Kernel, rows: Array, angles: Array) -> dict[str, Array]:
+    """Return the series at the samples `rows`, each of shape (samples,); `angles` are those of `Model.turned`."""
     model = kernel.model
-    states, constants = kernel.unpack(images)
+    states, constants = kernel.unpack(rows)
     spin, rattle, inertia = model.energy(states, constants)
     series = {"spin": spin, **model.observe(states, constants)}
     for x, y in _VECTORS:
@@ -369,11 +368,11 @@ def _series(kernel: Kernel, images: Array, angles: Array) -> dict[str, Array]:
             along, across = series[x], series[y]
             series[x] = along * np.cos(angles) + across * np.sin(angles)
             series[y] = across * np.cos(angles) - along * np.sin(angles)
-    if RIPPLE in kernel.follows:
-        series["ripple_free_spin"] = kernel.steady_spin(images)
+    if kernel.ripple:
+        series["ripple_free_spin"] = kernel.steady_spin(rows)
     if "energy_error" in kernel.measure:
         series["energy"] = rattle + 0.5 * inertia * spin**2
-        series["dissipated"] = kernel.table(images)["work"]
+        series["dissipated"] = kernel.table(rows)["work"]
     return series
 
 

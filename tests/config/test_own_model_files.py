@@ -14,7 +14,7 @@ from support.own import FADING, PENDULUM, ROLLING
 
 import sweep
 from sweep.config import InputError, load_config
-from sweep.models.model import ENERGY, LINEAR
+from sweep.models.model import Offer
 from sweep.models.theory.stability import stable_ranges
 from sweep.models.user import loading
 
@@ -69,7 +69,7 @@ BROKEN = {
                       "        return cls"),
     "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "invalid model name 'slip': use letters, digits"),
     "spin_state": after(PENDULUM, "spin_state=1", "spin_state=3", "and spin_state the index of one of them"),
-    "offers": after(PENDULUM, "COUNT, SPIN})", 'COUNT, "modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
+    "offers": after(PENDULUM, "Offer.SPIN})", '"modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
     "units": after(PENDULUM, "spin_state=1,", 'spin_state=1, units="CGS",', "units 'CGS' are unknown; choose paper, "),
     "unknown": after(PENDULUM, "spin_state=1,", 'spin_state=1, parameters=("nu",),', "parameter 'nu' is unknown"),
     "no period": after(PENDULUM, "    slower_period=", "    # ", "define slower_period, or do not offer COUNT"),
@@ -238,7 +238,7 @@ def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_o
         slopes, rest = model.rhs(model.start(columns), constants)
         got.append([*slopes, *rest, *constants, model.fastest_decay(columns), *stable_ranges(model, columns)])
     np.testing.assert_allclose(got[1], got[0], rtol=1e-13)
-    assert {LINEAR, ENERGY} <= mine.equations.offers == ours.equations.offers
+    assert {Offer.LINEAR, Offer.ENERGY} <= mine.equations.offers == ours.equations.offers
     assert mine.equations.faint == ours.equations.faint
 
 

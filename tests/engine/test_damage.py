@@ -1,6 +1,6 @@
 """What a run does with a checkpoint or dataset that is damaged, foreign or of another configuration or version.
 
-Damaged tiles and images are computed again, and the files come out as of an undisturbed run, byte for byte.
+Damaged tiles and rows are computed again, and the files come out as of an undisturbed run, byte for byte.
 What would mix other numbers in is refused.  Real processes that are killed are in `test_faults`.
 """
 
@@ -53,7 +53,7 @@ def undisturbed(config: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[
 
 @pytest.fixture(scope="module")
 def half(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What an interrupted run leaves: three finished tiles, images of the three others."""
+    """What an interrupted run leaves: three finished tiles, rows of the three others."""
     out = tmp_path_factory.mktemp("half")
     running, last_of_first = (out / "small.checkpoint" / name for name in ("running.npz", "000002.npz"))
 

@@ -185,9 +185,9 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
     sound = np.isin(found["status"], (SETTLED, TIME_LIMIT))
     columns = {name: values[sound] for name, values in job.grids[0].columns().items()}
     kernel, times = kernel_of(PLAIN, config), found["t_stop"][sound]
-    images = kernel.images(columns, steps_of(PLAIN, config, columns)[0] / 2, times)
-    execute(kernel, images)
-    difference = np.abs(measured(kernel, images, times)["spin_final"] - found["spin_final"][sound])
+    rows = kernel.start(columns, steps_of(PLAIN, config, columns)[0] / 2, times)
+    execute(kernel, rows)
+    difference = np.abs(measured(kernel, rows, times)["spin_final"] - found["spin_final"][sound])
     ratio = difference / found["spin_error"][sound]
     assert sound.mean() > 0.9
     assert np.isfinite(ratio).mean() > 0.9  # unknown where round-off decides

@@ -130,16 +130,16 @@ def test_a_failure_is_approached_beyond_where_the_cell_settled_first(monkeypatch
         return np.full(1, PARADOX), stretch, *np.zeros((2, 1))
 
     lives = begin([part])
-    kernel, images = part.kernel, lives[0].cells.images
-    table = kernel.table(images)
-    execute(kernel, images)
+    kernel, rows = part.kernel, lives[0].cells.rows
+    table = kernel.table(rows)
+    execute(kernel, rows)
     assert table["status"] == SETTLED
     end = table["done"] + 1000
     reached = []
     for goal in (end - 8, end):
         table["status"], table["settles"], table["goal"] = RUNNING, False, goal
-        execute(kernel, images)
-        reached.append(kernel.model_states(images)[:, 0].copy())
+        execute(kernel, rows)
+        reached.append(kernel.model_states(rows)[:, 0].copy())
     table["status"] = PARADOX
     monkeypatch.setattr(failures, "approach", approach)
     live(lives)
@@ -250,6 +250,6 @@ def test_states_that_overflow_are_read_without_a_warning() -> None:
     (part,) = plan(
         load_config({"name": "unstable", "model": "effective", "friction": {"mu": 60.0}, "measure": ["reversals"]})
     ).parts
-    images = part.images.copy()
-    images[:, : len(part.kernel.model.states)] = 1e305
-    assert part.kernel.spins(images).shape == part.take(np.arange(len(images)), images).inertia.shape == (1,)
+    rows = part.rows.copy()
+    rows[:, : len(part.kernel.model.states)] = 1e305
+    assert part.kernel.spins(rows).shape == part.take(np.arange(len(rows)), rows).inertia.shape == (1,)

@@ -101,7 +101,7 @@ def _listed(folder: Path) -> list[Path]:
 def moments(watch: Watch) -> dict[str, Callable[[], bool]]:
     """When to strike, recognised by the names of the files."""
 
-    def images() -> int:
+    def rows() -> int:
         try:
             return (watch.folder / "small.checkpoint" / "running.npz").stat().st_mtime_ns
         except FileNotFoundError:
@@ -113,13 +113,13 @@ def moments(watch: Watch) -> dict[str, Callable[[], bool]]:
     def unfinished(*names: str) -> bool:
         return any(name.endswith(".part") and name.startswith(names) for name in watch.names)
 
-    images_before, tiles_before = images(), tiles()
+    images_before, tiles_before = rows(), tiles()
     return {
         # The lock is taken, no chunk is done.
         "start": lambda: ".small.lock" in watch.names,
         # A chunk is done and saved, the next one is at work.
-        "kernel": lambda: images() != images_before and not unfinished("."),
-        "checkpoint": lambda: images() != images_before and unfinished(".running", ".0"),
+        "kernel": lambda: rows() != images_before and not unfinished("."),
+        "checkpoint": lambda: rows() != images_before and unfinished(".running", ".0"),
         # A tile is saved, others of its group are not.
         "tile": lambda: tiles() > tiles_before,
         "dataset": lambda: unfinished(".small.nc"),

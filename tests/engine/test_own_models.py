@@ -197,7 +197,7 @@ UPRIGHT = """\
 from dataclasses import replace
 
 from sweep.models.ladder import slip
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN
+from sweep.models.model import Offer
 
-MODEL = replace(slip.MODEL, name="mine", offers=frozenset({COUNT, SPIN, ENERGY, LINEAR}))
+MODEL = replace(slip.MODEL, name="mine", offers=frozenset({Offer.COUNT, Offer.SPIN, Offer.ENERGY, Offer.LINEAR}))
 """

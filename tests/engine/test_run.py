@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write, columns
-from support.kernels import images, kernel, threads
+from support.kernels import kernel, started, threads
 from support.runs import in_sittings, same_numbers
 
 import sweep
@@ -63,7 +63,7 @@ def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = 0.0
     chunks: list[float] = []
     ours = kernel()
-    table = images(ours, 0.02, 5_000.0, mu=np.linspace(40, 60, 8))
+    table = started(ours, 0.02, 5_000.0, mu=np.linspace(40, 60, 8))
 
     def advance(*arguments: Any) -> None:
         nonlocal clock
@@ -80,7 +80,7 @@ def test_chunks_are_kept_short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_images_of_a_batch_go_with_it(monkeypatch: pytest.MonkeyPatch, write: Write) -> None:
-    """Not when Python looks for cycles: the images of several batches take hundreds of MiB."""
+    """Not when Python looks for cycles: the state rows of several batches take hundreds of MiB."""
     made: list[weakref.ref[Lives]] = []
 
     class Watched(Lives):

@@ -23,14 +23,14 @@ def test_a_pause_between_blocks_changes_no_bit() -> None:
     (part,) = plan(load_config({"name": "round", "cases": columns(b=9.8), "integrator": {"method": "adams"}})).parts
     paused, kernel = part.take(np.arange(1)), part.kernel
     for steps in (100.0, 1000.0, 5000.0):
-        table = kernel.table(paused.images)
+        table = kernel.table(paused.rows)
         table["goal"], table["status"] = whole_blocks(np.full(1, steps)), RUNNING
-        executor.execute(kernel, paused.images)
-    kernel.table(part.images)["goal"] = table["goal"]
-    executor.execute(kernel, part.images)
+        executor.execute(kernel, paused.rows)
+    kernel.table(part.rows)["goal"] = table["goal"]
+    executor.execute(kernel, part.rows)
     # When to look for a skip depends on how many steps are left.
     same = [name for name in kernel.layout.names if name != "quiet_after"]
-    np.testing.assert_array_equal(table.columns(same), kernel.table(part.images).columns(same))
+    np.testing.assert_array_equal(table.columns(same), kernel.table(part.rows).columns(same))
 
 
 def test_a_rolling_rattle_turns_the_vertical_spin_by_its_product_of_inertia_alone() -> None:

@@ -60,7 +60,7 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
     assert started == [
         ("kernel", "adams", "slip", "reversals", "round_off", "decay"),
-        ("images", "adams", "slip"),
+        ("beginning", "adams", "slip"),
         ("endings", "dopri5", "slip"),
         ("kernel", "dopri5", "slip", "reversals", "round_off", "decay"),
     ]

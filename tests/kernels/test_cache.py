@@ -21,9 +21,9 @@ body = {name: np.array([60.0 if name == "mu" else p.default]) for name, p in PAP
 for measure in sys.argv[1:]:
     kernel = make_kernel("dopri5", MODELS["averaged"], measure.split("+"))
     found = kernel.advancing.is_compiled()
-    images = kernel.images(body, np.array([0.1]), 50.0)
-    execute(kernel, images)
-    print("found" if found else "compiled", repr(float(kernel.model.energy(*kernel.unpack(images))[0][0])))
+    rows = kernel.start(body, np.array([0.1]), 50.0)
+    execute(kernel, rows)
+    print("found" if found else "compiled", repr(float(kernel.model.energy(*kernel.unpack(rows))[0][0])))
 """
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from support import adaptive, columns
-from support.kernels import PAPER_FORM, finish, images, kernel, run, spin
+from support.kernels import PAPER_FORM, finish, kernel, run, spin, started
 from support.ripple import form as numerical_form
 
 from sweep.kernels import methods
@@ -42,7 +42,7 @@ def test_measuring_does_not_alter_the_motion() -> None:
 def test_windows_are_averages_of_the_ripple_free_spin() -> None:
     """Count, time and mean against the same definition applied to a finely sampled trajectory."""
     t_end, body = 800.0, columns(mu=75.0)
-    table = images(DOPRI, 0.01, t_end, mu=75.0)
+    table = started(DOPRI, 0.01, t_end, mu=75.0)
     tau, times = of(table, "period")[0], np.arange(0, t_end, 0.05)
     y = adaptive.motion(body, times, rtol=1e-9, atol=1e-13)[:STATES]
     p = PAPER_FORM.model.constants.of(body)
@@ -70,7 +70,7 @@ def test_beats_are_no_reversals() -> None:
 
 def test_energy_error_is_the_largest_violation() -> None:
     """Against the balance in the same steps with the work integrated by SciPy's quadrature weights."""
-    table = images(DOPRI, 0.02, BLOCK * 0.02 * 20)
+    table = started(DOPRI, 0.02, BLOCK * 0.02 * 20)
     worst, before = 0.0, of(table, "energy_start")[0]
     blocks = 0
     while of(table, "status")[0] == 0:
@@ -91,14 +91,14 @@ def test_a_step_beyond_stability_is_diverged(parameters: dict[str, float], exces
 
 
 def test_not_a_number_is_diverged() -> None:
-    table = images(DOPRI, 0.02, 10.0)
+    table = started(DOPRI, 0.02, 10.0)
     table[0, 2] = np.nan
     assert of(finish(DOPRI, table), "status")[0] == DIVERGED
 
 
 def test_a_settled_rattle_ends_as_exact_zeros() -> None:
     """Without it, the rattle would decay through denormal numbers and slow the kernel down."""
-    table = images(DOPRI, 0.02, 30_000.0, settle=True, n0=0.001, x0=1e-58, y0=1e-58)
+    table = started(DOPRI, 0.02, 30_000.0, settle=True, n0=0.001, x0=1e-58, y0=1e-58)
     assert table[0, [0, 1]].all()
     finish(DOPRI, table, settle=False)
     assert of(table, "status")[0] == TIME_LIMIT

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import PAPER_FORM, finish, images, run, spin, threads
+from support.kernels import PAPER_FORM, finish, run, spin, started, threads
 from support.kernels import kernel as make
 
 from sweep.kernels.adams import start_up
@@ -36,7 +36,7 @@ MIXED: dict[str, dict[str, Any]] = {
 
 def mixed(kernel: Kernel) -> np.ndarray:
     """Cells that settle, reach the limit, lift off and diverge, at different steps."""
-    return images(kernel, t_end=900.0, settle=True, **MIXED[kernel.method])
+    return started(kernel, t_end=900.0, settle=True, **MIXED[kernel.method])
 
 
 @pytest.fixture(scope="module")
@@ -91,18 +91,18 @@ def test_bit_identical_when_interrupted_and_resumed(kernel: Kernel, expected: di
 
 @each_method
 def test_time_limit_is_met_exactly(kernel: Kernel) -> None:
-    image = kernel.table(run(kernel, 0.03, 100.0))
-    assert image["status"] == TIME_LIMIT
-    assert image["done"] == image["goal"]
-    begin = image["begin"] if "begin" in kernel.layout else 0.0
-    assert begin + image["done"] * image["step"] == pytest.approx(100.0, rel=1e-14)
-    assert image["step"] == 100 / np.ceil(100 / 0.03)
-    assert kernel.times(image.images, 100.0) == 100.0
+    row = kernel.table(run(kernel, 0.03, 100.0))
+    assert row["status"] == TIME_LIMIT
+    assert row["done"] == row["goal"]
+    begin = row["begin"] if "begin" in kernel.layout else 0.0
+    assert begin + row["done"] * row["step"] == pytest.approx(100.0, rel=1e-14)
+    assert row["step"] == 100 / np.ceil(100 / 0.03)
+    assert kernel.times(row.rows, 100.0) == 100.0
 
 
 @each_method
 def test_equilibrium_stays_exactly(kernel: Kernel) -> None:
-    table = images(kernel, 0.02, 500.0, x0=0.0, y0=0.0, n0=[0.0, 0.05, -0.3])
+    table = started(kernel, 0.02, 500.0, x0=0.0, y0=0.0, n0=[0.0, 0.05, -0.3])
     before = table[:, :7].copy()
     finish(kernel, table)
     np.testing.assert_array_equal(table[:, :7], before)
@@ -164,7 +164,7 @@ def assembly(function: Any, *arguments: Any) -> str:
 )  # fmt: skip
 def test_the_loop_over_lanes_is_vector_instructions(method: str, model: str) -> None:
     made: Any = make(method, model)
-    found = assembly(made.stepper.make_run_block(made), np.zeros(len(made.layout.names) * LANES), LANES // PACK)
+    found = assembly(made.stepper.body(made), np.zeros(len(made.layout.names) * LANES), LANES // PACK)
     # Twelve square roots and divisions a step of dopri5; the stiff method has a scalar loop as well, for a history that
     # overlaps the group, which it never does.
     divisions, roots = (12, 12) if method == "dopri5" else (3, 2)

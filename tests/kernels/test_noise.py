@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import PAPER_FORM, images, kernel, run
+from support.kernels import PAPER_FORM, kernel, run, started
 from support.physics import turned_inertia
 
 import sweep
@@ -74,10 +74,10 @@ def test_a_mode_that_sank_is_flagged_only_once_it_has_grown_back() -> None:
 
 
 def test_a_mode_let_down_too_late_is_flagged() -> None:
-    table = images(ADAMS, 0.05, 9000.0, n0=[0.05, 0.01])
+    table = started(ADAMS, 0.05, 9000.0, n0=[0.05, 0.01])
     table[:, [ADAMS.layout.index(name) for name in skips.SCALES]] = 12.0
     ADAMS.table(table)["status"] = QUIET
-    ADAMS.carry(table)
+    ADAMS.stepper.between(ADAMS, table)
     assert (ADAMS.table(table)["status"] == RUNNING).all()
     assert list(ADAMS.table(table)["round_off"]) == [0, 1]
     assert list(ADAMS.table(table)["scale0"]) == [12, 0]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support import adaptive, columns
-from support.kernels import PAPER_FORM, finish, images, kernel
+from support.kernels import PAPER_FORM, finish, kernel, started
 
 import sweep
 from sweep.kernels.adams import skips
@@ -13,7 +13,7 @@ from sweep.kernels.layout import BLOCK
 from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models import find
 from sweep.models.ladder import slip
-from sweep.models.model import MODES, stack, take
+from sweep.models.model import Offer, stack, take
 from sweep.models.stiff.modes import RATTLE, Rattle, bending
 from sweep.models.theory import linear, stability
 
@@ -72,7 +72,7 @@ def test_modes_move_as_the_full_model() -> None:
 
 @pytest.mark.parametrize("c", [1.0, 1.7])
 def test_the_power_of_friction_after_a_skip_is_that_of_the_full_model(c: float) -> None:
-    table = images(ADAMS, 0.05, 90_000.0, mu=60.0, a=10.0 * c, b=3.0 * c, c=c, x0=1e-7, y0=1e-7)
+    table = started(ADAMS, 0.05, 90_000.0, mu=60.0, a=10.0 * c, b=3.0 * c, c=c, x0=1e-7, y0=1e-7)
     rattle = Rattle.of(PAPER_FORM, *ADAMS.unpack(table))
     skips.move(ADAMS, table, rattle, np.full(1, 10.0 * BLOCK), np.zeros((1, 2)))
     _, (_, power, _, _) = slip.MODEL.rhs(ADAMS.model_states(table), ADAMS.unpack(table)[1])
@@ -85,7 +85,7 @@ def test_a_couple_slows_the_spin_of_a_body_that_hardly_rattles() -> None:
     scene = {"body": {"b": 3.0}, "friction": friction, "start": {"n0": 0.002, "x0": 1e-9, "y0": 1e-9}}
     found = sweep.run(scene, method="adams", t_end=20_000, stop_early=False)
     assert float(found.spin_final) == pytest.approx(0.002 * np.exp(-1e-4 * 20_000 / ((10**2 + 3**2) / 5)), rel=1e-9)
-    assert MODES not in find("slip+viscous+sigma").offers
+    assert Offer.MODES not in find("slip+viscous+sigma").offers
 
 
 def test_energies_of_the_modes_add_up() -> None:
@@ -170,7 +170,7 @@ def test_bending_is_the_size_of_what_steps_show() -> None:
 
 @pytest.mark.parametrize("size", [1e-30, 1e-12])
 def test_tiny_starts_end_as_stepped_ones(size: float, skipped: list[float]) -> None:
-    table = images(
+    table = started(
         ADAMS, 0.05, 12_000.0, settle=True, mu=[60.0, 200.0, 60.0], n0=[0.02, 0.05, -0.015], x0=size, y0=size
     )
     ours, theirs = finish(ADAMS, table.copy()), stepped(table)
@@ -188,7 +188,7 @@ def test_tiny_starts_end_as_stepped_ones(size: float, skipped: list[float]) -> N
 def test_spin_is_kept_to_the_tolerance(skipped: list[float]) -> None:
     for tolerance in (1e-8, 1e-5):
         tolerant = kernel("adams", tolerance=tolerance)
-        table = images(tolerant, 0.05, 3000.0, mu=60.0, n0=[0.01, 0.02, 0.05], x0=1e-9, y0=1e-9)
+        table = started(tolerant, 0.05, 3000.0, mu=60.0, n0=[0.01, 0.02, 0.05], x0=1e-9, y0=1e-9)
         ours, theirs = finish(tolerant, table.copy(), settle=False), stepped(table, settle=False)
         assert skipped
         np.testing.assert_allclose(ours[:, row("spin")], theirs[:, row("spin")], atol=tolerance)
@@ -196,8 +196,8 @@ def test_spin_is_kept_to_the_tolerance(skipped: list[float]) -> None:
 
 def test_long_rest_and_upright_spin_take_few_steps(skipped: list[float]) -> None:
     """Decayed, at rest, or upright for ever: to t = 1e6 in one skip each."""
-    table = images(ADAMS, 0.1, 1e6, settle=True, n0=[0.001, 0.0, 0.05, 0.0], x0=[0.01, 0.0, 0.0, 0.01])
-    table[2, 0:7] = images(ADAMS, 0.1, 1e6, x0=0.0, y0=0.0)[0, 0:7]
+    table = started(ADAMS, 0.1, 1e6, settle=True, n0=[0.001, 0.0, 0.05, 0.0], x0=[0.01, 0.0, 0.0, 0.01])
+    table[2, 0:7] = started(ADAMS, 0.1, 1e6, x0=0.0, y0=0.0)[0, 0:7]
     finish(ADAMS, table, settle=False)
     assert len(skipped) >= 3
     assert (table[:, row("status")] == TIME_LIMIT).all()
@@ -206,7 +206,7 @@ def test_long_rest_and_upright_spin_take_few_steps(skipped: list[float]) -> None
 
 
 def test_windows_continue_after_a_skip() -> None:
-    table = images(ADAMS, 0.1, 1e5, n0=0.001)
+    table = started(ADAMS, 0.1, 1e5, n0=0.001)
     finish(ADAMS, table, settle=False)
     one = table[0]
     assert one[row("closed_window")] == pytest.approx(one[row("spin")] * one[row("period")], rel=1e-12)
@@ -217,7 +217,7 @@ def test_windows_continue_after_a_skip() -> None:
 
 
 def test_bit_identical_for_chunks() -> None:
-    table = images(ADAMS, 0.05, 9000.0, settle=True, mu=np.linspace(50, 200, 40), x0=1e-9, y0=1e-9)
+    table = started(ADAMS, 0.05, 9000.0, settle=True, mu=np.linspace(50, 200, 40), x0=1e-9, y0=1e-9)
     whole = finish(ADAMS, table.copy())
     assert (whole[:, row("status")] != RUNNING).all()
     assert (whole[:, row("status")] == SETTLED).any()
@@ -243,10 +243,10 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def test_no_looks_where_no_skip_can_help(looks: list[int]) -> None:
     """A look takes as long as two thousand steps: to t = 400 they were two thirds of the time."""
-    finish(ADAMS, images(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
+    finish(ADAMS, started(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
     assert not looks
     # Nor when there is no more time for that.
-    finish(ADAMS, images(ADAMS, 0.1, 1200.0, mu=60.0), settle=False)
+    finish(ADAMS, started(ADAMS, 0.1, 1200.0, mu=60.0), settle=False)
     assert 0 < len(looks) <= 5
     for sizes in ([1e-5, 1e-9], [1e-1, 1e-9]):
         assert decide(sizes, left=7000).wait[0] == np.inf

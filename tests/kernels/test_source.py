@@ -41,7 +41,7 @@ print(json.dumps([way, *(found[name].values.tolist() for name in ("spin_final", 
 
 @pytest.mark.parametrize(
     ("method", "function", "wanted"),
-    [("dopri5", slip.equations(slip.MODEL.variant), "step"), ("adams", stiff_slip._compliance, "run_block")],
+    [("dopri5", slip.equations(slip.MODEL.variant), "step"), ("adams", stiff_slip._compliance, "body")],
 )
 def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., Any], wanted: str) -> None:
     """Without compilation a run takes the same steps in plain Python, to numbers that are the same to rounding."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import columns
-from support.kernels import PAPER_FORM, finish, images_of, kernel, spin, threads
+from support.kernels import PAPER_FORM, finish, kernel, spin, started_cells, threads
 
 import sweep
 from sweep.kernels.adams import start_up
@@ -29,7 +29,7 @@ STEPS = np.resize([0.1, 0.05, 0.02, 0.12, 0.07], CELLS)
 
 
 def begun(body: Columns, step: np.ndarray, kernel: Kernel = ADAMS, t_end: float = 400.0) -> np.ndarray:
-    return images_of(kernel, body, step, t_end)
+    return started_cells(kernel, body, step, t_end)
 
 
 def cell(body: Columns, i: int) -> Columns:
@@ -45,26 +45,26 @@ def resolved(body: Columns, t_end: float, step: float) -> np.ndarray:
 @pytest.mark.parametrize(("step", "bound"), [(0.1, 1e-7), (0.02, 2e-10)])
 def test_states_history_and_work_against_dopri5(mu: float, step: float, bound: float) -> None:
     body = columns(mu=mu)
-    image = begun(body, np.array([step]))[0]
-    p = take(ADAMS.unpack(image[None])[1], 0)
-    fine, h = min(0.004, 0.3 / max(mu, 1.0)), image[ADAMS.layout.index("step")]
+    row = begun(body, np.array([step]))[0]
+    p = take(ADAMS.unpack(row[None])[1], 0)
+    fine, h = min(0.004, 0.3 / max(mu, 1.0)), row[ADAMS.layout.index("step")]
     for j in range(HISTORY):
-        time = image[ADAMS.layout.index("begin")] - j * h
+        time = row[ADAMS.layout.index("begin")] - j * h
         twin = resolved(body, time, fine)
         state = np.array(PAPER_FORM.momentum(twin[:7], p))
         slot = HISTORY - 1 - j
-        slopes = image[ADAMS.layout.index(f"f{slot}_0") :][:5]
+        slopes = row[ADAMS.layout.index(f"f{slot}_0") :][:5]
         # By the exact slow slopes, at the exact slip.
         np.testing.assert_allclose(slopes, PAPER_FORM.slow(*state, p)[0], atol=100 * bound)
-        np.testing.assert_allclose(image[ADAMS.layout.index(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
+        np.testing.assert_allclose(row[ADAMS.layout.index(f"v{slot}_0") :][:2], state[5:], atol=10 * bound)
         if j == 0:
-            np.testing.assert_allclose(image[:7], state, atol=10 * bound)
-            assert image[ADAMS.layout.index("spin")] == pytest.approx(spin(DOPRI, twin[None])[0], abs=bound)
+            np.testing.assert_allclose(row[:7], state, atol=10 * bound)
+            assert row[ADAMS.layout.index("spin")] == pytest.approx(spin(DOPRI, twin[None])[0], abs=bound)
             work = twin[DOPRI.layout.index("work")]
-            assert image[ADAMS.layout.index("work")] == pytest.approx(work, rel=2e-3 * (step / 0.1) ** 3, abs=1e-13)
+            assert row[ADAMS.layout.index("work")] == pytest.approx(work, rel=2e-3 * (step / 0.1) ** 3, abs=1e-13)
         if j < 3:
             power = slip.MODEL.rhs(twin[:7], p)[1][1]
-            assert image[ADAMS.layout.index(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
+            assert row[ADAMS.layout.index(f"power{j}")] == pytest.approx(power, rel=1e-3, abs=1e-12)
 
 
 def test_start_up_leaves_no_trace_in_the_spin() -> None:

@@ -22,7 +22,7 @@ from sweep.models.general.couples import COUPLES as KINDS
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID, Surface
 from sweep.models.ladder import noslip, slip
-from sweep.models.model import LINEAR, Model, stack, take
+from sweep.models.model import Model, Offer, stack, take
 from sweep.models.theory import linear, stability
 from sweep.models.theory.rocking import frequencies
 
@@ -253,10 +253,10 @@ def test_a_small_rattle_knows_only_the_curvatures() -> None:
 
 def test_to_which_variants_the_linear_theory_applies() -> None:
     for name in ("slip+viscous+sigma", "slip+coulomb", "noslip+solid+sigma"):
-        assert LINEAR in find(name).offers
+        assert Offer.LINEAR in find(name).offers
     for name in ("slip+viscous+rolling", "slip+viscous+spinning", "slip+contensou", "noslip+solid"):
-        assert LINEAR not in find(name).offers
-    assert LINEAR not in noslip.MODEL.offers
+        assert Offer.LINEAR not in find(name).offers
+    assert Offer.LINEAR not in noslip.MODEL.offers
 
 
 def test_a_faint_rattle_slips_slowly() -> None:

@@ -42,16 +42,16 @@ def simulated_growth(bodies: Columns, spin: Array) -> Array:
     values = eigenvalues(model, columns)
     period = np.minimum(model.slower_period(columns), 10 / np.abs(values.real.max(axis=-1)))
     fastest = np.abs(values).max(axis=-1)
-    images = np.repeat(dopri5.images(columns, np.minimum(0.01, 2 / fastest), period), len(rattle), axis=0)
-    states = dopri5.states(images)
+    rows = np.repeat(dopri5.start(columns, np.minimum(0.01, 2 / fastest), period), len(rattle), axis=0)
+    states = dopri5.states(rows)
     states[:] = np.repeat(stack(model.upright(spin)), len(rattle), axis=1)
     for i, component in enumerate(rattle):
         states[component, i :: len(rattle)] = 1e-30
-    spins, energy, inertia = model.energy(*dopri5.unpack(images))
-    dopri5.table(images)["energy"] = energy + 0.5 * inertia * spins**2
-    execute(dopri5, images)
-    assert (dopri5.table(images)["status"] == TIME_LIMIT).all()
-    propagator = dopri5.states(images)[rattle].reshape(len(rattle), len(spin), len(rattle)).swapaxes(0, 1) / 1e-30
+    spins, energy, inertia = model.energy(*dopri5.unpack(rows))
+    dopri5.table(rows)["energy"] = energy + 0.5 * inertia * spins**2
+    execute(dopri5, rows)
+    assert (dopri5.table(rows)["status"] == TIME_LIMIT).all()
+    propagator = dopri5.states(rows)[rattle].reshape(len(rattle), len(spin), len(rattle)).swapaxes(0, 1) / 1e-30
     return np.asarray(np.log(np.abs(np.linalg.eigvals(propagator)).max(axis=-1)) / period)
 
 

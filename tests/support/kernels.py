@@ -37,8 +37,8 @@ def default_measures(model: str) -> tuple[str, ...]:
     return measures.default(find(model))
 
 
-def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
-    """Images of the standard case with some parameters replaced.
+def started(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
+    """State rows of the standard case with some parameters replaced.
 
     Parameters
     ----------
@@ -46,30 +46,30 @@ def images(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **p
     """
     body = columns(**parameters)
     stable = stability.stable_ranges(MODELS[kernel.model.name], body) if settle else None
-    return images_of(kernel, body, step, t_end, stable)
+    return started_cells(kernel, body, step, t_end, stable)
 
 
-def images_of(
+def started_cells(
     kernel: Kernel, body: dict[str, np.ndarray], step: Any, t_end: Any, stable: np.ndarray | None = None
 ) -> np.ndarray:
-    """Images of the cells `body`; without `stable` none of them settles."""
-    return kernel.images(body, np.broadcast_to(step, len(body["a"])).astype(float), t_end, stable)
+    """State rows of the cells `body`; without `stable` none of them settles."""
+    return kernel.start(body, np.broadcast_to(step, len(body["a"])).astype(float), t_end, stable)
 
 
 def finish(kernel: Kernel, table: np.ndarray, *, settle: bool = True, **options: Any) -> np.ndarray:
-    """Run all images to their ends, in place."""
+    """Run all rows to their ends, in place."""
     kernel.table(table)["settles"] = settle
     execute(kernel, table, **options)
     return table
 
 
 def run(kernel: Kernel, step: Any, t_end: float, *, settle: bool = False, **parameters: Any) -> np.ndarray:
-    """Images at their ends; parameters as of `images`."""
-    return finish(kernel, images(kernel, step, t_end, settle=settle, **parameters))
+    """State rows at their ends; parameters as of `started`."""
+    return finish(kernel, started(kernel, step, t_end, settle=settle, **parameters))
 
 
 def spin(kernel: Kernel, table: np.ndarray) -> np.ndarray:
-    """Spin of each image."""
+    """Spin of each row."""
     return kernel.model.energy(*kernel.unpack(table))[0]
 
 

@@ -5,7 +5,7 @@
 from typing import Any, NamedTuple
 
 from sweep.jit import inline
-from sweep.models.model import COUNT, LINEAR, SPIN, Model
+from sweep.models.model import Model, Offer
 from sweep.parameters import Parameter
 
 
@@ -47,7 +47,7 @@ MODEL = Model(
         Parameter("torque", "drive", "m g length", "spin at the start", 1.0, at_least=0, below=10),
         Parameter("angle", "start", "radian", "start angle", 1.0, above=-3.15, below=3.15),
     ),
-    offers=frozenset({COUNT, SPIN, LINEAR}),
+    offers=frozenset({Offer.COUNT, Offer.SPIN, Offer.LINEAR}),
     states=("angle", "rate", "phase"),
     spin_state=1,
     constants=Constants,

@@ -39,10 +39,10 @@ from sweep.kernels.adams.step import (
 from sweep.kernels.codegen import make_accept, make_access
 from sweep.kernels.kernel import Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, LANES, PACK, Table
-from sweep.kernels.measures.measurement import WORK, Stretch
-from sweep.kernels.method import Method, Tolerance
+from sweep.kernels.measures.measurement import Stretch
+from sweep.kernels.method import Tolerance
 from sweep.kernels.status import DIVERGED, RUNNING
-from sweep.models.model import MODES, Array, Columns, Model, stack
+from sweep.models.model import Array, Columns, Model, Offer, stack
 from sweep.models.stiff.form import StiffForm, velocities
 from sweep.models.stiff.modes import bending
 from sweep.models.stiff.slip import form_of, has_form
@@ -52,122 +52,109 @@ from sweep.models.theory.rocking import frequencies, implicit
 _HISTORY = tuple(name.format(slot) for slot in range(HISTORY) for name in POINT)
 
 
+# The error in spin at t = 400 is about n ρ θ⁶, within a factor of ten for most of 877 wide cells, where θ is the phase
+# of the fastest motion in a step, ρ the share by which the rattle may raise the decay rate of the slip, and n the
+# fastest spin within reach.  The growth of an error depends on the motion itself, and the run finds it
+# (`sweep.engine.errors`).
+_POWER = 6
+_LONGEST_PHASE = 0.4
+
+
 class Adams(Stepper):
     """The stepper of this method; its states contain M in place of ω.
 
-    Where the rattle is so small that its linear modes describe it to within `tolerance` in spin, these
-    give the further course of the trajectory, without steps (`sweep.kernels.adams.skips`), if they are known (`MODES`).
+    Where the rattle is so small that its linear modes describe it to within the kernel's tolerance in spin, these
+    give its further course, without steps (`sweep.kernels.adams.skips`), if they are known (`Offer.MODES`).
     """
 
-    method = "adams"
+    def runs(self, model: Model) -> bool:
+        return has_form(model)
 
-    # No stability limit is near, so the check may be loose; and at n = 0.05 an error in spin of 1e-4 is one of 4e-3
-    # in the energy.  With 1e-5, runs with loose tolerances at μ = 10⁴ ended as `diverged`, although every spin was
-    # right to the tolerance.
-    energy_gain = 1e-2
+    def steps_in(self, model: Model) -> Model:
+        return form_of(model).model
 
-    def __init__(self, form: StiffForm, tolerance: float) -> None:
-        self.form, self.model, self.tolerance = form, form.model, tolerance
+    def accurate_step(self, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance) -> Array:
+        form = form_of(model)
+        reach, at_rest = linear.fastest_spin(form.full, columns) * form.time_unit(columns), form.rest_decay(columns)
+        rise = np.divide(decay, at_rest, out=np.full_like(decay, 2.0), where=at_rest > 0) - 1  # 2 without friction
+        phase = (tolerance / np.maximum(rise * reach, tolerance)) ** (1 / _POWER)
+        return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
 
-    def quantities(self, follows: frozenset[str]) -> tuple[str, ...]:
+    def quantities(self, model: Model, *, work: bool) -> tuple[str, ...]:
         """Quantities for looks at small rattle, for the weights and the matrix P, and for the history."""
-        looks = ("quiet_energy", "quiet_after", "bending", *skips.SCALES) if MODES in self.model.offers else ()
-        powers = skips.POWERS if WORK in follows else ()
+        looks = ("quiet_energy", "quiet_after", "bending", *skips.SCALES) if Offer.MODES in model.offers else ()
+        powers = skips.POWERS if work else ()
         return (*looks, "begin", "spin", *powers, "gamma", "per_weight", *PREDICT, *CORRECT, *MATRIX, *_HISTORY)
 
-    def images(
-        self, kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array | None
-    ) -> Array:
-        """As `Kernel.images`, except that the images are those at the end of start-up, at the time in `begin`."""
-        levels = count_levels(self.form.slip_decay(columns), step)
+    def prepare(self, kernel: Kernel, table: Table, columns: Columns, step: Array, t_end: float | Array) -> None:
+        """Advance the rows to the end of start-up, at the time in `begin`."""
+        form = form_of(kernel.model)
+        levels = count_levels(form.slip_decay(columns), step)
         lead = duration(levels)
         steps = np.maximum(steps_to(t_end, step), lead + 1)
-        goal, step = steps - lead, t_end / steps
-        images = kernel.start(columns, step, goal, True, stable)
-        table = kernel.table(images)
-        self._set_method(table, kernel.unpack(images)[1])
+        table["steps"] = table["goal"] = steps - lead
+        table["step"] = step = t_end / steps
+        table["stable_step"] = True
+        _set_method(form, table, kernel.unpack(table.rows)[1])
         constants = table.columns(kernel.constants)
-        starts = stack(self.form.full.start(columns)).T
-        self._set_started(kernel, table, *start_up.start_up(self.form, step, constants, starts, levels))
-        if MODES in self.model.offers:
-            self._set_looks(table, columns)
-        return images
+        starts = stack(form.full.start(columns)).T
+        self._set_started(kernel, table, *start_up.start_up(form, step, constants, starts, levels))
+        if Offer.MODES in kernel.model.offers:
+            _set_looks(kernel, table, columns)
 
-    def filling(self) -> tuple[Cached, ...]:
-        return (start_up.compiled_start_up(self.form),)
+    def prepared_by(self, model: Model) -> tuple[Cached, ...]:
+        return (start_up.compiled_start_up(form_of(model)),)
 
-    def model_states(self, states: Array, constants) -> Array:
-        return velocities(self.form.slow, states, constants)
+    def model_states(self, model: Model, states: Array, constants) -> Array:
+        return velocities(form_of(model).slow, states, constants)
 
     def reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
         return np.where(table["done"] == table["steps"], t_end, reached)
 
-    def _set_method(self, table: Table, constants) -> None:
-        """Set the weights of the formulas and the matrix P."""
-        step = table["step"]
-        rocking = self.form.rocking(constants)
-        _, fastest = frequencies(rocking)
-        phase = fastest * step
-        correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
-        table.set_columns(PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
-        table.set_columns(CORRECT, correct)
-        table.set_columns(MATRIX, stack(implicit(correct[:, 0], rocking)).T)
-        table["per_weight"] = 1 / correct[:, 0]
-        table["gamma"] = BDF_GAMMA * step
-
     def _set_started(self, kernel: Kernel, table: Table, ended: Table, history: Array) -> None:
         """Set the state after start-up, and make up for the looks and measurements that it skipped."""
         # Friction stops the initial slip at once; that changes the spin but not M.
-        table.set_columns(self.model.states[5:], np.zeros((len(history), 2)))
-        before = kernel.steady_spin(table.images)
-        table.set_columns(self.model.states, ended.columns(self.model.states))
+        states = kernel.model.states
+        table.set_columns(states[5:], np.zeros((len(history), 2)))
+        before = kernel.steady_spin(table.rows)
+        table.set_columns(states, ended.columns(states))
         table.set_columns(_HISTORY, history[:, :, :-1].reshape(len(history), -1))
         table["begin"], table["status"] = ended["ticks"] * ended["spacing"], ended["status"]
-        if WORK in kernel.follows:
+        if kernel.work:
             table.set_columns(skips.POWERS, history[:, :-4:-1, -1])
-        spin, rattle, inertia = self.model.energy(*kernel.unpack(table.images))
+        spin, rattle, inertia = kernel.model.energy(*kernel.unpack(table.rows))
         energy = rattle + 0.5 * inertia * spin**2
         grown = energy > table["energy_start"] * (1 + self.energy_gain)
         table["status"] = np.where(grown, DIVERGED, table["status"])
         table["energy"], table["spin"] = energy, spin
-        mean = (before + kernel.steady_spin(table.images)) / 2
+        mean = (before + kernel.steady_spin(table.rows)) / 2
         stretch = Stretch(table["begin"], mean, spin, ended["work"], mode_energies=None)
         for each in kernel.measurements:
             each.skip(table, stretch)
 
-    def _set_looks(self, table: Table, columns: Columns) -> None:
-        """Set the energy below which, and the step after which, looks search for something to skip."""
-        reach, goal = linear.fastest_spin(self.model, columns), table["goal"]
-        tolerance = self.tolerance / self.form.time_unit(columns)
-        table["quiet_energy"] = skips.quiet_energy(reach)
-        time = goal * table["step"]
-        table["quiet_after"] = skips.first_look(self.model, columns, reach, time, goal, tolerance)
-        table["bending"] = bending(self.model, columns)
+    def between(self, kernel: Kernel, rows: Array) -> None:
+        skips.skip(form_of(kernel.model), kernel, rows, kernel.tolerance)
 
-    def carry(self, kernel: Kernel, images: Array) -> None:
-        """As `Kernel.carry`."""
-        skips.skip(self.form, kernel, images, self.tolerance)
+    def body(self, kernel: Kernel):
+        """As of `Stepper`.
 
-    def make_run_block(self, kernel: Kernel):
-        """Compiled (group, packs) -> None: takes `BLOCK` steps of all lanes.
-
-        Each step appends a point to a history that begins with the eight points of the image.  So a single step
+        Each step appends a point to a history that begins with the eight points of the row.  So a single step
         is compiled, rather than one for each place in a ring of eight.  The history is not part of the group: LLVM then
         recognises that writes to one cannot affect reads from the other.
         """
         layout, size = kernel.layout, len(POINT) * LANES
-        load_states, load_constants, _ = make_access(self.model, layout)
+        load_states, load_constants, _ = make_access(kernel.model, layout)
         load_points, append = make_history(size)
         load_weights = make_weights("group, lane", lambda name: f"group[{layout.at(name)} + lane]")
-        advance, accept = make_advance(self.form), make_accept(self.model, layout)
+        advance, accept = make_advance(form_of(kernel.model)), make_accept(kernel.model, layout)
         work_done, watch, wide = _make_work(kernel), kernel.make_watch(), full_width()
         FIRST, BEGIN, STEP, GOAL = map(layout.at, (_HISTORY[0], "begin", "step", "goal"))
         DONE, STATUS, SPIN = map(layout.at, ("done", "status", "spin"))
         kept, block, pack, lanes = HISTORY * size, BLOCK * size, PACK, LANES
 
         @compiled
-        def run_block(group, packs):
+        def body(group, packs):
             wide()
             # If the bound were a product, LLVM would take lanes for possibly negative, and not vectorise the loop.
             last, history = lanes if packs > 1 else pack, np.empty(kept + block)
@@ -194,12 +181,37 @@ class Adams(Stepper):
             for i in range(kept):
                 group[FIRST + i] = history[block + i]
 
-        return run_block
+        return body
+
+
+def _set_method(form: StiffForm, table: Table, constants) -> None:
+    """Set the weights of the formulas and the matrix P."""
+    step = table["step"]
+    rocking = form.rocking(constants)
+    _, fastest = frequencies(rocking)
+    phase = fastest * step
+    correct = step[:, None] * weights.fitted_weights(CORRECTOR_NODES, phase)
+    table.set_columns(PREDICT, step[:, None] * weights.fitted_weights(PREDICTOR_NODES, phase))
+    table.set_columns(CORRECT, correct)
+    table.set_columns(MATRIX, stack(implicit(correct[:, 0], rocking)).T)
+    table["per_weight"] = 1 / correct[:, 0]
+    table["gamma"] = BDF_GAMMA * step
+
+
+def _set_looks(kernel: Kernel, table: Table, columns: Columns) -> None:
+    """Set the energy below which, and the step after which, looks search for something to skip."""
+    model = kernel.model
+    reach, goal = linear.fastest_spin(model, columns), table["goal"]
+    tolerance = kernel.tolerance / form_of(model).time_unit(columns)
+    table["quiet_energy"] = skips.quiet_energy(reach)
+    time = goal * table["step"]
+    table["quiet_after"] = skips.first_look(model, columns, reach, time, goal, tolerance)
+    table["bending"] = bending(model, columns)
 
 
 def _make_work(kernel: Kernel):
     """Inline (group, lane, h, power) -> the work of friction in a step; 0 if no measurement needs it."""
-    if WORK not in kernel.follows:
+    if not kernel.work:
         return nothing
     POWER0, POWER1, POWER2 = map(kernel.layout.at, skips.POWERS)
 
@@ -212,47 +224,22 @@ def _make_work(kernel: Kernel):
     return work_done
 
 
-# The error in spin at t = 400 is about n ρ θ⁶, within a factor of ten for most of 877 wide cells, where θ is the phase
-# of the fastest motion in a step, ρ the share by which the rattle may raise the decay rate of the slip, and n the
-# fastest spin within reach.  The growth of an error depends on the motion itself, and the run finds it
-# (`sweep.engine.errors`).
-_POWER = 6
-_LONGEST_PHASE = 0.4
-
-
-def accurate_step(model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance) -> Array:
-    """Step at which the error in spin at t = 400 sqrt(c/g) is about `tolerance`, in the model's units, shape (cells,).
-
-    Parameters
-    ----------
-    motion, decay : the `fastest_motion` and the `fastest_decay`, shape (cells,)
-    """
-    form = form_of(model)
-    reach, at_rest = linear.fastest_spin(form.full, columns) * form.time_unit(columns), form.rest_decay(columns)
-    rise = np.divide(decay, at_rest, out=np.full_like(decay, 2.0), where=at_rest > 0) - 1  # 2 without friction
-    phase = (tolerance / np.maximum(rise * reach, tolerance)) ** (1 / _POWER)
-    return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
-
-
-def _stepper(model: Model, tolerance: float) -> Adams:
-    return Adams(form_of(model), tolerance)
-
-
-METHOD = Method(
-    name=Adams.method,
+METHOD = Adams(
+    name="adams",
     code=1,
     summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
     "friction does not limit its step",
-    stepper=_stepper,
-    accurate_step=accurate_step,
-    runs=has_form,
     automatic=True,
     # On one thread start-up takes 8 to 11 µs, and a step of dopri5 22 ns.
     step_cost=0.64,
     start_up_cost=650.0,
     compile_seconds=14.0,
-    companion=1.2,
+    longer=1.2,
     error_order=4,
     least_error=0.03,
-    foresight=skips.WORTHWHILE,
+    # No stability limit is near, so the check may be loose; and at n = 0.05 an error in spin of 1e-4 is one of 4e-3
+    # in the energy.  With 1e-5, runs with loose tolerances at μ = 10⁴ ended as `diverged`, although every spin was
+    # right to the tolerance.
+    energy_gain=1e-2,
+    horizon=skips.WORTHWHILE,
 )

@@ -27,7 +27,7 @@ import numpy as np
 from sweep.kernels.adams.step import HISTORY, SLIPS, SLOPES
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, Table
-from sweep.kernels.measures.measurement import WORK, Stretch
+from sweep.kernels.measures.measurement import Stretch
 from sweep.kernels.status import QUIET, RUNNING
 from sweep.models.model import Array, Columns, Model
 from sweep.models.stiff.form import STATES, StiffForm
@@ -123,7 +123,7 @@ def skip(form: StiffForm, kernel: Kernel, rows: Array, tolerance: float) -> None
     if not len(quiet):
         return
     table = kernel.table(rows[quiet])
-    states, constants = kernel.unpack(table.images)
+    states, constants = kernel.unpack(table.rows)
     rattle = Rattle.of(form, states, constants)
     sizes = rattle.sizes(table["bending"])
     scales = _given_up(kernel, table, sizes)
@@ -132,10 +132,10 @@ def skip(form: StiffForm, kernel: Kernel, rows: Array, tolerance: float) -> None
     wait = np.ceil(np.minimum(found.wait / step, goal))
     table["quiet_after"] = done + np.where(found.now, found.steps, 0) + wait
     table["status"] = RUNNING
-    moved = table.images[found.now]
+    moved = table.rows[found.now]
     move(kernel, moved, rattle.select(found.now), found.steps[found.now], found.scales[found.now])
-    table.images[found.now] = moved
-    rows[quiet] = table.images
+    table.rows[found.now] = moved
+    rows[quiet] = table.rows
 
 
 def _given_up(kernel: Kernel, table: Table, sizes: Array) -> Array:
@@ -362,7 +362,7 @@ def move(kernel: Kernel, rows: Array, rattle: Rattle, steps: Array, scales: Arra
     table.set_columns(_RATTLE, table.columns(_RATTLE) + rattle.changes(factors, rattle.amplitudes))
     table["M3"] += rattle.turned(after) - rattle.turned(rattle.amplitudes)
     _move_history(table, rattle, factors)
-    if WORK in kernel.follows:
+    if kernel.work:
         _move_powers(rattle.form, table, kernel.unpack(rows)[1])
     spin, energy, inertia = kernel.model.energy(*kernel.unpack(rows))
     table["spin"] = spin

@@ -4,8 +4,8 @@ It cannot be requested: every kernel that counts the reversals of a model with t
 prediction of the slow equations for a state (`resting_spin.endings`), so that they are solved once.  It also watches
 circular rattles, as in nearly round bodies, for which there are no such equations.
 
-At regular looks it takes M·u/J33, to which the spin tends while the rattle decays (`sweep.models.stiff.precession`),
-and finds the slope with which that changes with the energy, by least squares over all looks of a window (Welford 1962,
+At regular checks it takes M·u/J33, to which the spin tends while the rattle decays (`sweep.models.stiff.precession`),
+and finds the slope with which that changes with the energy, by least squares over all checks of a window (Welford 1962,
 Technometrics 4, 419).  If `STEEPER` times this slope and all the energy left carry the spin neither through zero nor to
 where a rattle grows, no reversal will come.  Of 423 cells of `configs/mu_b.yaml` that nothing else settles by
 t = 30 000, this holds for 334; none of these reverses by t = 10⁶, while 27 of the others do.
@@ -19,22 +19,22 @@ from sweep.jit import inline
 from sweep.kernels.codegen import make_load
 from sweep.kernels.layout import BEYOND, STABLE, Layout, constants_of
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.model import MODES, Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.models.stiff.form import STATES
 from sweep.models.stiff.precession import vertical_spin
 from sweep.models.stiff.slip import form_of
 
 NEXT, EVERY = "watch_next", "watch_every"
-"""The step of the next look, infinite if there is none, and the steps between two."""
+"""The step of the next check, infinite if there is none, and the steps between two."""
 
 WOUND, LEFT = "spin_when_wound_down", "windows_left"
 """Results of the last window: the least spin that remains when the rattle has decayed, 0 unless no reversal can come;
 and the number of further windows that it takes to decay at this rate, negative if it grows at the expense of the spin,
 and 0 if no energy was lost."""
 
-LOOKS = 256
-"""Looks in a window, less one.  Of the roundest bodies of `mu_b` a rattle loses 0.03 % of its energy in a tenth of the
-first leg, so that a few looks could not distinguish this from the ripple of M·u/J33, which is 3e-6."""
+CHECKS = 256
+"""Checks in a window, less one.  Of the roundest bodies of `mu_b` a rattle loses 0.03 % of its energy in a tenth of the
+first leg, so that a few checks could not distinguish this from the ripple of M·u/J33, which is 3e-6."""
 
 STEEPER = 8.0
 """The slope of M·u/J33 over the energy grows as the rattle decays, in nearly round bodies about as the sixth power of
@@ -44,9 +44,9 @@ STEEPER = 8.0
 # by more than the inverse has taken it from the spin, and the slope does not show how the spin ends.
 _SLOW = 0.5
 
-_WINDOW = ("looks", "first_spin", "first_total", "mean_spin", "mean_total", "sum_squares", "sum_products")
-"""For the present window: the number of looks; M·u/J33 and the square of the spin that would have all the energy, at
-the first look and on average; the sum of the squares of the latter's deviations from its average, and that of the
+_WINDOW = ("checks", "first_spin", "first_total", "mean_spin", "mean_total", "sum_squares", "sum_products")
+"""For the present window: the number of checks; M·u/J33 and the square of the spin that would have all the energy, at
+the first check and on average; the sum of the squares of the latter's deviations from its average, and that of the
 products."""
 
 PREDICTED = ("predicted_at", "predicted_spin", "predicted_reversals", "predicted_overshoot", "predicted_nearest")
@@ -56,7 +56,7 @@ PREDICTED = ("predicted_at", "predicted_spin", "predicted_reversals", "predicted
 class Decay(Measurement):
     name = "decay"
     summary = "effect of the rattle on the spin after the run"
-    asks = MODES
+    asks = Offer.MODES
     needs = ("reversals",)
     quantities = (NEXT, EVERY, WOUND, LEFT, *_WINDOW, *PREDICTED)
 
@@ -72,20 +72,20 @@ class Decay(Measurement):
 
         return settled
 
-    def make_look(self, layout: Layout):
+    def make_check(self, layout: Layout):
         WATCHED, BETWEEN, AFTER, TO_COME = map(layout.at, (NEXT, EVERY, WOUND, LEFT))
         COUNT, SPIN0, TOTAL0, SPIN, TOTAL, SQUARES, PRODUCTS = map(layout.at, _WINDOW)
         DONE, states, stays = layout.at("done"), _make_states(layout), _make_stays(layout)
 
         @inline
-        def look(group, lane, seen):
+        def check(group, lane, seen):
             due = seen.running & (group[DONE + lane] >= group[WATCHED + lane])
             spin, total = vertical_spin(states(group, lane), seen.spin, seen.rattle, seen.J)
-            looks = group[COUNT + lane] + 1.0
-            first, over = looks == 1.0, looks > LOOKS
+            checks = group[COUNT + lane] + 1.0
+            first, over = checks == 1.0, checks > CHECKS
             spin0, total0 = spin if first else group[SPIN0 + lane], total if first else group[TOTAL0 + lane]
             of_spin, of_total = spin - group[SPIN + lane], total - group[TOTAL + lane]
-            off = of_total - of_total / looks
+            off = of_total - of_total / checks
             squares, products = group[SQUARES + lane] + of_total * off, group[PRODUCTS + lane] + of_spin * off
             energy, energy0, slope = total - spin * spin, total0 - spin0 * spin0, products / squares
             end = spin - STEEPER * slope / (1.0 - 2.0 * spin * slope) * energy
@@ -95,16 +95,16 @@ class Decay(Measurement):
             final = final & stays(group, lane, spin if spin < end else end, end if spin < end else spin)
             if due:
                 group[WATCHED + lane] += group[BETWEEN + lane]
-                group[COUNT + lane] = 0.0 if over else looks
+                group[COUNT + lane] = 0.0 if over else checks
                 group[SPIN0 + lane], group[TOTAL0 + lane] = spin0, total0
-                group[SPIN + lane] = 0.0 if over else group[SPIN + lane] + of_spin / looks
-                group[TOTAL + lane] = 0.0 if over else group[TOTAL + lane] + of_total / looks
+                group[SPIN + lane] = 0.0 if over else group[SPIN + lane] + of_spin / checks
+                group[TOTAL + lane] = 0.0 if over else group[TOTAL + lane] + of_total / checks
                 group[SQUARES + lane], group[PRODUCTS + lane] = (0.0, 0.0) if over else (squares, products)
                 group[AFTER + lane] = (abs(end) if final else 0.0) if over else group[AFTER + lane]
                 left = energy / (energy0 - energy) if falls else 0.0
                 group[TO_COME + lane] = left if over else group[TO_COME + lane]
 
-        return look
+        return check
 
 
 def _make_states(layout: Layout):

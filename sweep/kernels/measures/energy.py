@@ -11,17 +11,17 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
-from sweep.kernels.measures.measurement import WORK, Measurement, Stretch, measured
-from sweep.models.model import ENERGY, Array
+from sweep.kernels.measures.measurement import Measurement, Stretch, measured
+from sweep.models.model import Array, Offer
 from sweep.units import NUMBER
 
 
 class EnergyError(Measurement):
     name = "energy_error"
     summary = "largest violation of the energy balance: an error that a run measures by itself"
-    asks = ENERGY
+    asks = Offer.ENERGY
     by_default = True
-    follows = frozenset({WORK})
+    work = True
     quantities = ("work", "violation")
 
     variables = {
@@ -33,24 +33,24 @@ class EnergyError(Measurement):
     }  # fmt: skip
 
     def make_step(self, layout: Layout, at_reversal):
-        WORK = layout.at("work")
+        DISSIPATED = layout.at("work")
 
         @inline
         def step(group, lane, taken):
-            group[WORK + lane] += taken.work if taken.accepted else 0.0
+            group[DISSIPATED + lane] += taken.work if taken.accepted else 0.0
 
         return step
 
-    def make_look(self, layout: Layout):
-        WORK, VIOLATION, START = map(layout.at, (*self.quantities, "energy_start"))
+    def make_check(self, layout: Layout):
+        DISSIPATED, VIOLATION, START = map(layout.at, (*self.quantities, "energy_start"))
 
         @inline
-        def look(group, lane, seen):
-            violation = abs(seen.total + group[WORK + lane] - group[START + lane])
+        def check(group, lane, seen):
+            violation = abs(seen.total + group[DISSIPATED + lane] - group[START + lane])
             worst = group[VIOLATION + lane]
             group[VIOLATION + lane] = violation if violation > worst else worst
 
-        return look
+        return check
 
     def skip(self, table: Table, stretch: Stretch) -> None:
         table["work"] += stretch.work

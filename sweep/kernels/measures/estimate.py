@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sweep.kernels.measures.measurement import Measurement
-from sweep.models.model import ENDING
+from sweep.models.model import Offer
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
@@ -13,7 +13,7 @@ class Estimate(Measurement):
 
     name = "estimate"
     summary = "reversals by the slow equations, without the oscillations, and whether they are certain"
-    asks = ENDING
+    asks = Offer.ENDING
     variables = {
         "reversals_estimated": Variable(
             "int16", NUMBER, "spin reversals, estimated", "Spin reversals by the slow equations of the `slow` model."

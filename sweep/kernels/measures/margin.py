@@ -22,7 +22,7 @@ from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.measures.resting_spin import endings, ends_as_predicted
 from sweep.kernels.status import SETTLED
-from sweep.models.model import COUNT, Array
+from sweep.models.model import Array, Offer
 from sweep.units import SPIN
 
 EXTREMES = ("overshoot", "nearest_approach")
@@ -32,7 +32,7 @@ EXTREMES = ("overshoot", "nearest_approach")
 class Margin(Measurement):
     name = "margin"
     summary = "distance in spin of each trajectory from one more reversal, and from one fewer"
-    asks = COUNT
+    asks = Offer.COUNT
     needs = ("reversals",)
     by_default = True
     quantities = (
@@ -52,13 +52,13 @@ class Margin(Measurement):
         ),
     }  # fmt: skip
 
-    def make_look(self, layout: Layout):
+    def make_check(self, layout: Layout):
         OVERSHOOT, NEAREST, COUNTED, TIME, SIZE, TIME_BEFORE, SIZE_BEFORE = map(layout.at, self.quantities)
         CLOSED, PERIOD, COUNT = map(layout.at, ("closed_window", "period", "reversals"))
         DONE, STEP, PHASE, SHIFTED = map(layout.at, ("done", "step", "phase", "shifted"))
 
         @inline
-        def look(group, lane, seen):
+        def check(group, lane, seen):
             period, count = group[PERIOD + lane], group[COUNT + lane]
             size = abs(group[CLOSED + lane]) / period
             # When the window closed; if half a window has closed since then, `shifted` is 0.
@@ -66,7 +66,7 @@ class Margin(Measurement):
             time = group[DONE + lane] * group[STEP + lane] - since
             first, middle, size1, size2 = group[TIME_BEFORE + lane], group[TIME + lane], size, group[SIZE + lane]
             size3 = group[SIZE_BEFORE + lane]
-            # The first window counts however early the look: a run may settle there, with no other.
+            # The first window counts however early the check: a run may settle there, with no other.
             if seen.running & (size > 0.0) & ((time > middle + 0.5 * period) | (size2 == 0.0)):
                 new = count != group[COUNTED + lane]
                 overshoot, nearest = group[OVERSHOOT + lane], group[NEAREST + lane]
@@ -82,7 +82,7 @@ class Margin(Measurement):
                 group[TIME_BEFORE + lane], group[SIZE_BEFORE + lane] = (0.0, 0.0) if new else (middle, size2)
                 group[TIME + lane], group[SIZE + lane], group[COUNTED + lane] = time, size, count
 
-        return look
+        return check
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         arc = last_arc(table, ends_as_predicted(table))

@@ -4,17 +4,17 @@ Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of
 configuration, the kernels of all methods, the dataset and the plots then include it.  `energy_error` is a short
 example.
 
-A measurement keeps its numbers in quantities of its own in each image, named by `quantities`.  It fills and reads
+A measurement keeps its numbers in quantities of its own in each state row, named by `quantities`.  It fills and reads
 them in hooks, all of which are optional:
 
-    start              once, when the images are made
+    start              once, when the rows are made
     make_step          for one lane after every step
     make_at_reversal   for one lane after every step, by way of the measurement `reversals`
-    make_may_settle    for one lane at every look, before it is decided whether the trajectory ends
+    make_may_settle    for one lane at every check, before it is decided whether the trajectory ends
     make_settled       the same
-    make_look          for one lane at every look, after that decision
-    skip               for many images, when they have covered a stretch without steps
-    mode_lost          for many images, when the scale of a mode is given up
+    make_check         for one lane at every check, after that decision
+    skip               for many rows, when they have covered a stretch without steps
+    mode_lost          for many rows, when the scale of a mode is given up
     read, doubts       once, when the trajectories have ended
 
 A hook `make_…` is itself called once, when the kernel is made.  It returns None, or a function marked
@@ -22,9 +22,9 @@ A hook `make_…` is itself called once, when the kernel is made.  It returns No
 one that is idle or has ended, so the function must not change the quantities where its arguments say that the step
 does not count.  After a step it has to do so by conditional expressions rather than branches, so that the loop over
 lanes stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost`, `read`
-and `doubts` a quantity is `table["name"]`, of shape (images,).
+and `doubts` a quantity is `table["name"]`, of shape (cells,).
 
-Whatever a run does not measure takes no space in its images and adds no instruction to its kernel.
+Whatever a run does not measure takes no space in its rows and adds no instruction to its kernel.
 
 Units: times in sqrt(c/g), spins in sqrt(g/c), energies in m g c.
 """
@@ -36,7 +36,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from sweep.kernels.layout import Layout, Table
-from sweep.models.model import Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.units import Unit
 from sweep.variables import Variable
 
@@ -48,10 +48,6 @@ def measured(
     return Variable(dtype, units, long_name, description, along=along, of_sound_runs=True)
 
 
-WORK, RIPPLE = "work", "ripple"
-"""Quantities that a measurement may follow: the work of friction, and the ripple-free spin."""
-
-
 class Step(NamedTuple):
     """A step of one lane, as passed to `Measurement.make_step`."""
 
@@ -60,24 +56,24 @@ class Step(NamedTuple):
     spin: float
     """Spin before the step."""
     steady: float
-    """Ripple-free spin before the step (`theory.ripple`); the spin itself unless a measurement follows the `RIPPLE`."""
+    """Ripple-free spin before the step (`theory.ripple`); the spin itself unless a measurement needs it (`ripple`)."""
     work: float
-    """Work of friction in the step; may be zero unless a measurement follows the `WORK`."""
+    """Work of friction in the step; may be zero unless a measurement needs it (`work`)."""
     h: float
     """Length of the step."""
     now: float
     """Time at the end of the step."""
 
 
-class Look(NamedTuple):
-    """The findings of a look at one lane, as passed to `Measurement.make_look`."""
+class Check(NamedTuple):
+    """The findings of a check at one lane, as passed to `Measurement.make_check`."""
 
     running: bool
-    """Whether the trajectory was running before the look."""
+    """Whether the trajectory was running before the check."""
     ended: bool
-    """Whether it has ended at this look."""
+    """Whether it has ended at this check."""
     spin: float
-    """Spin at the time of the look."""
+    """Spin at the time of the check."""
     rattle: float
     """Energy of the rattle."""
     J: float
@@ -88,7 +84,7 @@ class Look(NamedTuple):
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of time that images have covered without steps of the kernel; arrays of shape (images,)."""
+    """A stretch of time that trajectories have covered without steps of the kernel; arrays of shape (cells,)."""
 
     time: Array
     """Length of the stretch."""
@@ -99,7 +95,7 @@ class Stretch:
     work: Array
     """Work of friction during the stretch: the energy that it has dissipated."""
     mode_energies: Array | None
-    """Energies of the slower and the faster mode at its end, shape (images, 2); None if the modes are not resolved."""
+    """Energies of the slower and the faster mode at its end, shape (cells, 2); None if the modes are not resolved."""
 
 
 @dataclass(frozen=True)
@@ -110,15 +106,17 @@ class Measurement:
     """As in the configuration."""
     summary: ClassVar[str]
     """One line for the documentation."""
-    asks: ClassVar[str]
-    """What a model must offer for it: `COUNT`, `SPIN`, `ENERGY`, `MODES` or `FORMULAS` of `sweep.models.model`."""
+    asks: ClassVar[Offer]
+    """What a model must offer for it."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Names of the measurements on which it builds; a configuration has to include them too.  A measurement that
     implements `make_at_reversal` needs "reversals"."""
     by_default: ClassVar[bool] = False
     """Whether it is made by default, if the model supports it."""
-    follows: ClassVar[frozenset[str]] = frozenset()
-    """Which quantities it needs in each step; they are computed only on request: `WORK` or `RIPPLE`."""
+    work: ClassVar[bool] = False
+    """Whether it needs the work of friction in each step, which is computed only on request."""
+    ripple: ClassVar[bool] = False
+    """Whether it needs the ripple-free spin in each step, likewise."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
@@ -127,7 +125,7 @@ class Measurement:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of the quantities that it adds to an image.  They start at zero, except those that `start` sets."""
+        """Names of the quantities that it adds to a state row.  They start at zero, except those that `start` sets."""
         return ()
 
     @property
@@ -143,9 +141,9 @@ class Measurement:
     @property
     def in_kernel(self) -> bool:
         """Whether it changes the kernel, by a quantity or by a hook in the loop."""
-        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_settled", "make_look")
+        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_settled", "make_check")
         own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
-        return bool(self.quantities or own or self.follows)
+        return bool(self.quantities or own or self.work or self.ripple)
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
@@ -185,24 +183,24 @@ class Measurement:
         A trajectory settles if this holds for one measurement, and the other hook for all.
         """
 
-    def make_look(self, layout: Layout):
-        """Inline (group, lane, seen) -> None, called at every look with its findings, a `Look`."""
+    def make_check(self, layout: Layout):
+        """Inline (group, lane, seen) -> None, called at every check with its findings, a `Check`."""
 
     def skip(self, table: Table, stretch: Stretch) -> None:
-        """Update `table` for a stretch that its images have covered without steps: start-up or a skip.
+        """Update `table` for a stretch that its rows have covered without steps: start-up or a skip.
 
-        The other quantities of the images are already those at the end of the stretch.
+        The other quantities of the rows are already those at the end of the stretch.
         """
 
-    def mode_lost(self, table: Table, images: Array) -> None:
+    def mode_lost(self, table: Table, rows: Array) -> None:
         """Update `table` for a rescaled mode that grew too large before its factor was taken back, so that the factor
         is given up.
 
-        `images` is a mask over the images of `table`, shape (images,).
+        `rows` is a mask over the rows of `table`, shape (cells,).
         """
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        """Values of the variables, by name, from the images of trajectories that ended at `times`, shape (cells,).
+        """Values of the variables, by name, from the rows of trajectories that ended at `times`, shape (cells,).
 
         Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.  By default they are
         the quantities of the same names.
@@ -210,5 +208,5 @@ class Measurement:
         return {name: table[name] for name in self.variables if name in self.quantities}
 
     def doubts(self, table: Table) -> Array | int:
-        """Bits of `sweep.kernels.status.Doubt`: what it has against the results of these images, shape (cells,)."""
+        """Bits of `sweep.kernels.status.Doubt`: what it has against the results of the trajectories, shape (cells,)."""
         return 0

@@ -4,7 +4,7 @@ It cannot be requested: every kernel that counts the reversals of a model with t
 error of such a cell cannot be estimated (`sweep.engine.errors`).
 
 A mode that has decayed to 1e-16 of the other is filled in by round-off.  When it grows again it grows from noise, and
-the reversal that it causes comes too early.  From one look to the next, the logarithm of each mode's amplitude is
+the reversal that it causes comes too early.  From one check to the next, the logarithm of each mode's amplitude is
 changed by the growth rate at the mean spin, within the limit set by the energy present.  The depth to which a mode
 had fallen is checked when it has come back.
 
@@ -25,7 +25,7 @@ from sweep.kernels.measures.measurement import Measurement, Stretch
 from sweep.kernels.status import Doubt
 from sweep.models.general import starts
 from sweep.models.general.reversal_time import energies
-from sweep.models.model import MODES, Array, Columns, Model, stack
+from sweep.models.model import Array, Columns, Model, Offer, stack
 from sweep.models.stiff.slip import form_of
 from sweep.models.theory import linear
 
@@ -47,7 +47,7 @@ _STARTS = (*starts.POINT, *starts.ANGLES, *starts.SLIP)
 class RoundOff(Measurement):
     name = "round_off"
     summary = "whether round-off decides the times of late reversals"
-    asks = MODES
+    asks = Offer.MODES
     needs = ("reversals",)
     quantities = (
         *_LOGS, *_DEPTHS, *_RATES, "tracked", "tracked_spin", "tracked_reversals", "round_off",
@@ -61,8 +61,8 @@ class RoundOff(Measurement):
             "tracked_spin": starts.spin(columns, model.variant.surface)
         }
 
-    def make_look(self, layout: Layout):
-        """Follow the modes from one look to the next, as in `Measurement.make_look`."""
+    def make_check(self, layout: Layout):
+        """Follow the modes from one check to the next, as in `Measurement.make_check`."""
         LOG0, LOG1, DEPTH0, DEPTH1 = map(layout.at, (*_LOGS, *_DEPTHS))
         TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.quantities[-4:])
         RATE0, RATE1, terms = layout.at("rate0_0"), layout.at("rate1_0"), len(linear.NODES)
@@ -70,9 +70,9 @@ class RoundOff(Measurement):
         deep = float(np.log(DEPTH))
 
         @inline
-        def look(group, lane, seen):
+        def check(group, lane, seen):
             spin, rattle = seen.spin, seen.rattle
-            # The trajectory ends at this look, with a rattle that is large enough to count.
+            # The trajectory ends at this check, with a rattle that is large enough to count.
             last = seen.ended & (2.0 * rattle / seen.J > SEEN * spin * spin)
             closed, done, count = group[CLOSED + lane], group[DONE + lane], group[COUNT + lane]
             mean = closed / group[PERIOD + lane] if closed != 0.0 else spin
@@ -103,7 +103,7 @@ class RoundOff(Measurement):
                 group[TRACKED + lane], group[SPIN + lane], group[COUNTED + lane] = done, mean, count
                 group[FLAG + lane] = 1.0 if noise else group[FLAG + lane]
 
-        return look
+        return check
 
     def skip(self, table: Table, stretch: Stretch) -> None:
         if stretch.mode_energies is None:
@@ -112,8 +112,8 @@ class RoundOff(Measurement):
         table["tracked"] = table["done"]
         table["tracked_spin"] = stretch.spin
 
-    def mode_lost(self, table: Table, images: Array) -> None:
-        table["round_off"] = np.where(images, 1.0, table["round_off"])
+    def mode_lost(self, table: Table, rows: Array) -> None:
+        table["round_off"] = np.where(rows, 1.0, table["round_off"])
 
     def doubts(self, table: Table) -> Array:
         return np.where(table["round_off"] > 0, Doubt.ROUND_OFF, 0)

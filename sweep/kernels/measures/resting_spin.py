@@ -19,7 +19,7 @@ from sweep.kernels.layout import Table, constants_of
 from sweep.kernels.measures.decay import PREDICTED
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.status import SETTLED
-from sweep.models.model import ENDING, MODES, Array, stack
+from sweep.models.model import Array, Offer, stack
 from sweep.models.stiff.final_spin import Ending, ending
 from sweep.models.stiff.form import STATES
 from sweep.models.stiff.slip import form_of
@@ -32,7 +32,7 @@ _AT_A_TIME = 512
 class RestingSpin(Measurement):
     name = "resting_spin"
     summary = "final spin of a settled trajectory"
-    asks = MODES
+    asks = Offer.MODES
     by_default = True
 
     variables = {
@@ -61,9 +61,9 @@ def endings(table: Table, which: Array) -> Ending:
 
     If the table has a place for it, it keeps the prediction for a state.
     """
-    result, keeps = Ending(*np.full((4, len(table.images)), np.nan)), PREDICTED[0] in table.layout
+    result, keeps = Ending(*np.full((4, len(table.rows)), np.nan)), PREDICTED[0] in table.layout
     model = table.layout.model
-    if model is None or ENDING not in model.offers:
+    if model is None or Offer.ENDING not in model.offers:
         return result
     new = which & np.isfinite(table.columns(model.states)).all(axis=1)
     if keeps:
@@ -75,7 +75,7 @@ def endings(table: Table, which: Array) -> Ending:
 
     def find(first: int) -> None:
         some = cells[first : first + _AT_A_TIME]
-        found = ending(form_of(model), *slow_states(Table(table.images[some], table.layout)))
+        found = ending(form_of(model), *slow_states(Table(table.rows[some], table.layout)))
         for whole, part in zip(result, found, strict=True):
             whole[some] = part
 
@@ -87,7 +87,7 @@ def endings(table: Table, which: Array) -> Ending:
 
 
 def slow_states(table: Table) -> tuple[Array, Any]:
-    """States and constants of the stiff form, from images of a model with modes in either set of variables."""
+    """States and constants of the stiff form, from state rows of a model with modes in either set of variables."""
     model = table.layout.model
     constants = model.constants(*table.columns(constants_of(model)).T)
     states = table.columns(model.states).T

@@ -1,6 +1,6 @@
 """The times of the first K reversals, K from the configuration: `measure: [reversals, {reversal_times: 12}]`.
 
-After a step only the latest times are shifted along; a look moves them to their places.  Written in every step, five
+After a step only the latest times are shifted along; a check moves them to their places.  Written in every step, five
 times or more kept LLVM from vectorising the loop over lanes: 115 ns a step and lane in place of 21.
 """
 
@@ -14,18 +14,18 @@ import numpy as np
 from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, measured
-from sweep.models.model import SPIN, Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.units import TIME
 
 LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")
-"""If there are more than three reversals between two looks, which are windows apart, the earlier ones have no time."""
+"""If there are more than three reversals between two checks, which are windows apart, the earlier ones have no time."""
 
 
 @dataclass(frozen=True)
 class ReversalTimes(Measurement):
     name = "reversal_times"
     summary = "times of the first K reversals: {reversal_times: K}, by default K = 10"
-    asks = SPIN
+    asks = Offer.SPIN
     needs = ("reversals",)
     variables = {"reversal_times": measured("float64", TIME, "time of each spin reversal", along=("reversal",))}
     bounds = (1, 1000)
@@ -56,19 +56,19 @@ class ReversalTimes(Measurement):
 
         return at_reversal
 
-    def make_look(self, layout: Layout):
+    def make_check(self, layout: Layout):
         COUNT, RECORDED, FIRST, NEWEST = map(layout.at, ("reversals", "recorded", self.times[0], LATEST[0]))
         most, kept = self.count, len(LATEST)
 
         @inline
-        def look(group, lane, seen):
+        def check(group, lane, seen):
             count = int(group[COUNT + lane])
             for k in range(int(group[RECORDED + lane]), min(count, most)):
                 age = count - 1 - k
                 group[FIRST + k * LANES + lane] = group[NEWEST + age * LANES + lane] if age < kept else np.nan
             group[RECORDED + lane] = count
 
-        return look
+        return check
 
     def read(self, table: Table, times: Array) -> Mapping[str, Array]:
         return {"reversal_times": table.columns(self.times)}

@@ -20,18 +20,18 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import RIPPLE, Measurement, Stretch, measured
+from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.kernels.status import Doubt
-from sweep.models.model import COUNT, Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.units import NUMBER, SPIN, TIME
 
 
 class Reversals(Measurement):
     name = "reversals"
     summary = "number of spin reversals, the time of the last, and the spin averaged over the rattle"
-    asks = COUNT
+    asks = Offer.COUNT
     by_default = True
-    follows = frozenset({RIPPLE})
+    ripple = True
     quantities = (
         "period", "phase", "half", "earlier_half", "shifted", "closed_window", "closed_shifted",
         "reversals", "reversals_shifted", "last_reversal", "first_spin",

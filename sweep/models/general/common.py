@@ -14,7 +14,7 @@ from sweep.models.general import rigid_body, validity
 from sweep.models.general.couples import Couple
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.surfaces import ELLIPSOID, Surface
-from sweep.models.model import COUNT, ENERGY, LINEAR, SPIN, Array, Columns, named, zeros
+from sweep.models.model import Array, Columns, Offer, named, zeros
 from sweep.models.symbols import Constants, specialised
 
 SOLID = "solid"
@@ -93,10 +93,10 @@ class Variant:
         return specialised(function, **arguments, p=Constants(record._fields, self.known))
 
 
-def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[str]:
+def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[Offer]:
     """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
-    theory = {LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
-    return frozenset({COUNT, SPIN, ENERGY} | theory)
+    theory = {Offer.LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
+    return frozenset({Offer.COUNT, Offer.SPIN, Offer.ENERGY} | theory)
 
 
 @inline

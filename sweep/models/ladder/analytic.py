@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.models.general.validity import impossible
-from sweep.models.model import COUNT, FORMULAS, Array, Columns, Tier
+from sweep.models.model import Array, Columns, Offer, Tier
 from sweep.models.theory.coefficients import coefficients
 
 
@@ -59,7 +59,7 @@ MODEL = Tier(
     name="analytic",
     summary="the count by formula, without simulation (Takano 2011, nrk0, nrk1)",
     parameters=("a", "b", "c", "delta", "mu", "n0"),
-    offers=frozenset({COUNT, FORMULAS}),
+    offers=frozenset({Offer.COUNT, Offer.FORMULAS}),
     counts="reversals_predicted",
     impossible=impossible,
 )

@@ -19,7 +19,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.general.rigid_body import slower_period
 from sweep.models.general.validity import impossible
-from sweep.models.model import COUNT, ENERGY, FORMULAS, LINEAR, SPIN, Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 
 
@@ -61,7 +61,7 @@ MODEL = Model(
     spin_state=2,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
     positive=frozenset({"mu"}),  # the slip is a term of order 1/μ
-    offers=frozenset({COUNT, SPIN, ENERGY, FORMULAS, LINEAR}),
+    offers=frozenset({Offer.COUNT, Offer.SPIN, Offer.ENERGY, Offer.FORMULAS, Offer.LINEAR}),
     constants=Constants,
     start=start,
     impossible=impossible,

@@ -15,7 +15,7 @@ import numpy as np
 from sweep.jit import inline
 from sweep.models.general.rigid_body import slower_period
 from sweep.models.general.validity import impossible
-from sweep.models.model import COUNT, FORMULAS, LINEAR, SPIN, Array, Columns, Model, Ripple, named
+from sweep.models.model import Array, Columns, Model, Offer, Ripple, named
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.ripple import FORM, ripple_of_states
 
@@ -90,7 +90,7 @@ MODEL = Model(
     spin_state=4,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
     positive=frozenset({"mu"}),  # the slip is a term of order 1/μ
-    offers=frozenset({COUNT, SPIN, FORMULAS, LINEAR}),
+    offers=frozenset({Offer.COUNT, Offer.SPIN, Offer.FORMULAS, Offer.LINEAR}),
     constants=Constants,
     start=start,
     impossible=impossible,

@@ -17,7 +17,7 @@ from sweep.models.general.bounds import couples_decay
 from sweep.models.general.common import Variant, of_any_body, offers
 from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.rigid_body import about_contact, contact_on, energy_on, gyroscopic
-from sweep.models.model import REVERSAL_TIME, Array, Model, Ripple
+from sweep.models.model import Array, Model, Offer, Ripple
 from sweep.models.vectors import Vector
 
 
@@ -73,7 +73,7 @@ def rolling(variant: Variant, parameters: tuple[str, ...]) -> Model:
         summary="rolling without slip, the limit of infinite friction",
         states=("u1", "u2", "omega1", "omega2", "omega3"),
         parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=offers(couples, dissipates=bool(couples)) | {REVERSAL_TIME},
+        offers=offers(couples, dissipates=bool(couples)) | {Offer.REVERSAL_TIME},
         constants=record,
         start=lambda columns: starts.rolling(columns, surface),
         fastest_decay=lambda columns: couples_decay(couples, columns, surface),

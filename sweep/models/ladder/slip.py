@@ -36,7 +36,7 @@ from sweep.models.general.common import VISCOUS, Variant, of_any_body, offers
 from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.laws import Law
 from sweep.models.general.rigid_body import about_centre, contact_on, energy_on, gyroscopic
-from sweep.models.model import ENDING, FORMULAS, MODES, REVERSAL_TIME, Array, Columns, Model
+from sweep.models.model import Array, Columns, Model, Offer
 from sweep.models.vectors import Vector
 
 STATES = ("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2")
@@ -124,10 +124,10 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         states=STATES,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offers(couples, dissipates=law.coupled is None)
-        | ({REVERSAL_TIME} if law == VISCOUS else set())
-        | ({ENDING} if ending else set())
+        | ({Offer.REVERSAL_TIME} if law == VISCOUS else set())
+        | ({Offer.ENDING} if ending else set())
         # A couple slows the spin of a body that does not rattle; skips do not allow for that.
-        | ({MODES} if ending and not couples else set()),
+        | ({Offer.MODES} if ending and not couples else set()),
         constants=record,
         start=lambda columns: starts.slipping(columns, surface),
         fastest_decay=fastest_decay,
@@ -157,5 +157,5 @@ _PAPER = slipping(Variant(VISCOUS), ())
 MODEL = replace(
     _PAPER,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),
-    offers=_PAPER.offers | {FORMULAS},
+    offers=_PAPER.offers | {Offer.FORMULAS},
 )

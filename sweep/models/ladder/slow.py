@@ -8,14 +8,14 @@ simulated: `sweep.models.slow.estimate` gives the count.
 from __future__ import annotations
 
 from sweep.models.ladder import slip
-from sweep.models.model import COUNT, FORMULAS, Tier
+from sweep.models.model import Offer, Tier
 
 MODEL = Tier(
     name="slow",
     summary="the count by slow equations of two amplitudes and the spin, without oscillations",
     parameters=slip.MODEL.parameters,
     positive=frozenset({"mu"}),
-    offers=frozenset({COUNT, FORMULAS}),
+    offers=frozenset({Offer.COUNT, Offer.FORMULAS}),
     counts="reversals_estimated",
     impossible=slip.MODEL.impossible,
 )

@@ -57,7 +57,7 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
 
     Returns
     -------
-    Shape (7, cells), as `Kernel.images` takes it: the lower and the upper end of each range, in sqrt(g/c), and the
+    Shape (7, cells), as `Kernel.start` takes it: the lower and the upper end of each range, in sqrt(g/c), and the
     share of the first within which the rattle decays faster than a couple slows the spin.  An end is infinite where a
     range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body whose rattle does
     not decay at rest (no friction, or no dissipation in the model), or whose third axis is not an axis of inertia, so

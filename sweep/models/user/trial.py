@@ -13,7 +13,7 @@ import numpy as np
 
 from sweep.faults import fault_of
 from sweep.models.general.laws import LAWS, Law
-from sweep.models.model import COUNT, ENERGY, LINEAR, OWN, SPIN, Columns, Model, never_rocks, never_upright
+from sweep.models.model import OWN, Columns, Model, Offer, never_rocks, never_upright
 from sweep.models.origin import Origin
 from sweep.models.theory.linear import fastest_motion
 from sweep.models.theory.stability import stable_ranges
@@ -22,7 +22,7 @@ from sweep.models.variants import SlipWith
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.units import is_of_paper
 
-_OFFERS = {COUNT: "COUNT", SPIN: "SPIN", ENERGY: "ENERGY", LINEAR: "LINEAR"}
+_OFFERS = Offer.COUNT, Offer.SPIN, Offer.ENERGY, Offer.LINEAR
 
 Faults = Iterator[tuple[Any, str]]
 """The function at fault, or None, and a sentence on what is wrong and what to do."""
@@ -76,12 +76,13 @@ def _declared(made) -> Faults:
     if len(set(made.states)) < len(made.states) or made.spin_state not in range(len(made.states)):
         yield None, f"the states {made.states} need distinct names, and spin_state the index of one of them"
     if unknown := made.offers - set(_OFFERS):
-        yield None, f"a model cannot offer {', '.join(sorted(unknown))}; it may offer {', '.join(_OFFERS.values())}"
+        names = ", ".join(each.name for each in _OFFERS)
+        yield None, f"a model cannot offer {', '.join(sorted(unknown))}; it may offer {names}"
     if made.units not in ("paper", "SI", OWN):
         yield None, f"units {made.units!r} are unknown; choose paper, SI or {OWN}"
-    if made.upright is never_upright and (LINEAR in made.offers or made.fastest_motion is None):
+    if made.upright is never_upright and (Offer.LINEAR in made.offers or made.fastest_motion is None):
         yield None, "the length of its steps needs a bound on its motion; define upright or fastest_motion"
-    if COUNT in made.offers and made.slower_period is never_rocks:
+    if Offer.COUNT in made.offers and made.slower_period is never_rocks:
         yield None, "reversals are counted in an averaged spin; define slower_period, or do not offer COUNT"
 
 
@@ -149,7 +150,7 @@ def _settling_too_early(model: Model, columns: Columns, law: Law | None) -> Faul
         if not np.array_equal(at_rest, fast):
             words = "the resistance depends on the slip velocity; say by linear_to up to which it is nearly constant"
             yield law.resistance, words
-    if not law and LINEAR in model.offers:
+    if not law and Offer.LINEAR in model.offers:
         try:
             stable_ranges(model, columns)
         except ValueError as error:
