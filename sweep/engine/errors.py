@@ -44,22 +44,21 @@ from sweep.kernels.methods import METHODS
 from sweep.kernels.status import COUNT_DOUBTS, FAILURES, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.model import stack
 
-ROUNDS = 3
+ROUNDS = 4
 """Largest number of repeats of a cell."""
 
 AIM = 0.5
 """Share of the tolerance to which an error is reduced: for most cells it is known within a factor of two."""
 
 SHORTEST = 8.0
-"""Largest factor by which a repeat shortens the step. An error that needs more is treated as one that the motion
-amplifies without bound."""
+"""Largest factor by which one repeat shortens the step."""
 
 ROUND_OFF = 1e-13
 """An error in spin that no shorter step reduces, in sqrt(g/c)."""
 
 AMPLIFIED = 1e3
-"""Ratio of an error to the estimate from the energy balance above which no step shorter by more than `_MILD` is tried:
-the motion amplifies errors so much that it amplifies round-off too."""
+"""Ratio of an error to the estimate from the energy balance above which the motion may amplify round-off as much: the
+first repeat then shortens the step by `_MILD`, which shows cheaply whether shorter steps help."""
 
 APART = 0.1
 """The same for the difference of the two spins relative to their size: above it they have nothing in common."""
@@ -73,11 +72,16 @@ CLEAR = 10.0
 """Required ratio of the margin of a count to its estimated error: about one in a hundred estimates is more than ten
 times too small (docs/explanation/accuracy.md)."""
 
+# The factor of a first repeat that may not help, and the least one of further repeats: with less, chance decides whether
+# the error falls.
 _MILD = 2.0
 
 # A step that is shorter by some factor has to reduce the error by at least this power of the factor. Otherwise a
-# further step is of no use.
-_LEAST_ORDER = 3
+# further step is of no use. With the third power, a cell whose first estimate was too small by chance was given up.
+_LEAST_ORDER = 2
+
+# A factor below which an error that does not fall says nothing.
+_TOO_LITTLE = 1.5
 
 # The order assumed for both methods when a step is shortened, and how close to the limit of stability a longer one may
 # come, starting from the share of the limit used by automatic steps.
@@ -136,9 +140,11 @@ def after_companion(lives: Lives, which: Array) -> Array:
     large = errors.spin > AIM * limit
     by_chance = ~large & (OF_RATTLE * errors.rattle > AIM * limit)
     shorter = np.where(np.isinf(errors.spin) | by_chance, method.longer, shorter)
-    hopeless = (shorter > SHORTEST) | (errors.spin > most)
-    hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
-    long = np.fmin(shorter, SHORTEST) * now.kernel.table(now.rows)["done"] > MOST_STEPS
+    first = notes["repeats"][which] == 0
+    doubtful = first & ((errors.spin > AMPLIFIED * imbalance(now)) | (errors.apart > APART))
+    shorter = np.clip(shorter, np.where(first, 1.0, _MILD), np.where(doubtful, _MILD, SHORTEST))
+    hopeless = errors.spin > most
+    long = shorter * now.kernel.table(now.rows)["done"] > MOST_STEPS
     known = ~limited_by_round_off(now)
     again = (large | by_chance) & known & ~hopeless & ~long & (notes["repeats"][which] < ROUNDS) & rules.repeats
     if not rules.fixed:
@@ -146,7 +152,8 @@ def after_companion(lives: Lives, which: Array) -> Array:
     lives.cells.rows[which] = now.rows
     lives.note(which, ERRORS, stack(errors).T)
     on = which[again]
-    notes["most_error"][on] = np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]
+    any_error = by_chance | (shorter < _TOO_LITTLE)
+    notes["most_error"][on] = np.where(any_error, np.inf, errors.spin / shorter**_LEAST_ORDER)[again]
     notes["repeats"][on] += 1
     lives.note(on, ERRORS, np.nan)
     notes["step_rule"][on] = REPEAT
