@@ -147,7 +147,29 @@ def test_a_chaotic_cell_says_so() -> None:
     """It would count otherwise from another start, and no step is short enough for it."""
     found = cells([CHAOTIC, BODY], t_end=10_000)
     assert found.spin_error.values[0] > 1e-5
-    assert (found.doubts.values & (Doubt.STEP | Doubt.TOLERANCE)).tolist() == [Doubt.STEP | Doubt.TOLERANCE, 0]
+    assert (found.doubts.values & Doubt.TOLERANCE).tolist() == [Doubt.TOLERANCE, 0]
+    to_their_ends = run_cells([CHAOTIC, BODY])
+    assert to_their_ends.status.values.tolist() == [SETTLED, SETTLED]
+    assert to_their_ends.certain.values.tolist() == [0, 1]
+
+
+SENSITIVE = [
+    (38.0603120097, 5.54535804498, 0.814342780882, -0.427452900757, 65.928499215, -0.182253797345, 3.30604423756,
+     -0.501446292181),
+    (29.89, 3.289, 0.5278, 0.1653, 88.4, 0.07068, -1.181, 0.1118),
+]  # fmt: skip
+"""Their errors need a step more than eight times shorter, or are amplified more than a thousand times."""
+
+SENSITIVE_SPINS = [0.07870727672967845, 0.0023210078176600685]
+"""At t = 60 and 400, by heyoka's Taylor series in 80 bits; in double precision they differ by less than 1e-13."""
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
+@pytest.mark.parametrize(("body", "spin", "t_end"), [*zip(SENSITIVE, SENSITIVE_SPINS, [60.0, 400.0], strict=True)])
+def test_a_step_is_shortened_as_long_as_that_helps(body: tuple, spin: float, t_end: float, tolerance: float) -> None:
+    found = run_cells([dict(zip(STANDARD, body, strict=True))], t_end=t_end, stop_early=False, tolerance=tolerance)
+    assert not found.doubts.values[0] & Doubt.TOLERANCE
+    assert abs(float(found.spin_final[0]) - spin) < tolerance
 
 
 @pytest.mark.campaign
