@@ -31,7 +31,7 @@ def reached(work: Callable[[Callable[[str], None]], None]) -> list[str]:
     return reported
 
 
-def test_raised_at_the_next_point_and_once() -> None:
+def test_an_interrupt_is_raised_once_at_the_next_point() -> None:
     def work(tell: Callable[[str], None]) -> None:
         point()
         ctrl_c()
@@ -45,7 +45,7 @@ def test_raised_at_the_next_point_and_once() -> None:
     assert reached(work) == ["after Ctrl-C", "cleaned up"]
 
 
-def test_raised_at_the_end_of_a_block_without_points() -> None:
+def test_an_interrupt_is_raised_at_the_end_of_a_block_without_points() -> None:
     def work(tell: Callable[[str], None]) -> None:
         ctrl_c()
         tell("end")
@@ -56,7 +56,7 @@ def test_raised_at_the_end_of_a_block_without_points() -> None:
 
 
 @pytest.mark.parametrize("inside", [True, False])
-def test_an_inner_block_leaves_it_to_the_outer_one(inside: bool) -> None:
+def test_an_inner_block_leaves_an_interrupt_to_the_outer_one(inside: bool) -> None:
     def work(tell: Callable[[str], None]) -> None:
         if not inside:
             ctrl_c()
@@ -69,7 +69,7 @@ def test_an_inner_block_leaves_it_to_the_outer_one(inside: bool) -> None:
 
 
 @pytest.mark.parametrize("answered", [True, False])
-def test_a_second_one_is_raised_at_once(answered: bool) -> None:
+def test_a_second_interrupt_is_raised_at_once(answered: bool) -> None:
     def work(tell: Callable[[str], None]) -> None:
         ctrl_c()
         try:
@@ -94,7 +94,7 @@ def test_an_error_in_the_block_is_the_one_raised() -> None:
 
 
 @pytest.mark.parametrize("handler", [signal.SIG_IGN, lambda *_: None])
-def test_left_alone_where_somebody_else_listens(handler: signal._HANDLER) -> None:
+def test_a_handler_of_somebody_else_is_left_alone(handler: signal._HANDLER) -> None:
     signal.signal(signal.SIGINT, handler)
     with deferred():
         assert signal.getsignal(signal.SIGINT) is handler

@@ -89,7 +89,7 @@ def test_compiled_functions_options_records_and_arrays_count() -> None:
     assert len({meaning(of(USING, used=way)) for way in ways}) == len(ways)
 
 
-def test_recursion_ends() -> None:
+def test_a_recursive_function_has_a_meaning() -> None:
     text = "def make():\n    def function(x):\n        return function(x - 1) if x else 0.0\n    return function\n"
     assert meaning(of(text)) == meaning(of(text))
 

@@ -151,7 +151,7 @@ ROWS = "cases: {mu: [60, 130], roll: [2 deg, 0.01]}\n"
     [SMALL, STONE, BOWL, GRAVITY.replace("sigma: 1.0e-4", "sigma: [0, 1.0e-4]"), UNCERTAIN, FIRST, ROWS],
     ids=["paper", "ellipsoid", "paraboloid", "axis of gravity", "samples", "samples of first axes", "columns of cases"],
 )
-def test_it_survives_its_own_document(text: str, read: Read) -> None:
+def test_a_configuration_survives_its_own_document(text: str, read: Read) -> None:
     config = read(text)
     again = read(dump(config.document()))
     assert again == config

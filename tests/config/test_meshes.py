@@ -33,7 +33,7 @@ def pebble(turned: float = 0.0, directions: int = 160, rings: int = 60) -> np.nd
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.4])
-def test_a_shape_has_the_numbers_of_its_integrals_however_it_lies(turned: float) -> None:
+def test_a_shape_has_the_numbers_of_its_integrals_in_any_pose(turned: float) -> None:
     expected = runpy.run_path(str(ROOT / "scripts" / "body_inertia.py"))["properties"](**PEBBLE)
     found = meshes.body(meshes.mesh(pebble(turned)), {"density": PEBBLE["density"]})
     assert set(found) == set(expected)

@@ -119,7 +119,7 @@ def test_a_file_that_cannot_be_read_is_refused(folder: Path, name: str) -> None:
     refused(invoke("run", folder / "pendulum.yaml", "--set", f"model={name}"), "--set model: ", name)
 
 
-def test_its_code_is_announced_before_it_runs(folder: Path, ran: Path) -> None:
+def test_the_code_of_a_model_is_announced_before_it_runs(folder: Path, ran: Path) -> None:
     announced = []
 
     def announce(words: str) -> None:

@@ -235,7 +235,9 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("a;mu\n15\n", "cells.csv:2", "1 value, but 2 columns in line 1, with semicolons between them"),
     ],
 )
-def test_broken_cases(table: str, place: str, said: str, write: Write, tmp_path: Path) -> None:
+def test_a_broken_table_of_cases_is_refused_with_its_place(
+    table: str, place: str, said: str, write: Write, tmp_path: Path
+) -> None:
     (tmp_path / "cells.csv").write_text(table, encoding="utf-8")
     result = invoke("run", write(CASES))
     refused(result, said)

@@ -66,7 +66,7 @@ def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, tmp_path: Path) -
 
 
 @pytest.mark.campaign
-def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
+def test_a_run_that_settles_at_its_first_check_is_certain() -> None:
     """Its companion, in longer steps, closes a single window before the same time."""
     found = sweep.run(ROOT / "configs" / "kane_levinson_viscous.yaml", mu=5.0, n0=0.5, method="adams")
     assert float(found.margin_more) == pytest.approx(0.5, rel=0.01)
@@ -78,7 +78,7 @@ def test_a_run_that_settles_at_its_first_look_is_decided() -> None:
     "name",
     ["kane_levinson_coulomb", "kane_levinson_viscous", "mu", "pebble", "plastic_toy", "taps", "tippe_top", "wooden"],
 )
-def test_shipped_configurations_end_decided(name: str) -> None:
+def test_counts_of_shipped_configurations_are_certain(name: str) -> None:
     """Of the others, three are of nearly round bodies too, two go to a published time, and two reverse for ever."""
     found = sweep.run(ROOT / "configs" / f"{name}.yaml")
     assert float(found.certain.mean()) >= 0.98
@@ -93,7 +93,7 @@ def test_nearly_round_bodies_have_settled_in_the_end(name: str) -> None:
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["b", "mu", "quick"])
-def test_no_decided_count_contradicts_the_spin(name: str) -> None:
+def test_no_certain_count_contradicts_the_spin(name: str) -> None:
     found = sweep.run(ROOT / "configs" / f"{name}.yaml")
     odd = np.sign(found.n0) * np.sign(found.spin_final) != (-1.0) ** found.reversals
     assert not (odd & (found.certain == 1)).any()
@@ -136,7 +136,7 @@ def test_the_end_of_a_rattle_that_outlasts_the_spin_is_predicted() -> None:
 
 
 @pytest.mark.campaign
-def test_no_count_of_a_body_that_a_couple_slows_is_decided_too_early() -> None:
+def test_no_count_of_a_body_that_a_couple_slows_is_certain_too_early() -> None:
     random = np.random.default_rng(20261127)
     size = 150
 
@@ -213,7 +213,7 @@ def test_ripples_of_a_slow_mode_are_not_counted(method: str) -> None:
     assert (found.reversals.item(), found.certain.item()) == (1, 1)
 
 
-def test_a_count_of_the_wrong_parity_is_not_decided(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_count_of_the_wrong_parity_is_not_certain(monkeypatch: pytest.MonkeyPatch) -> None:
     start = Reversals.start
     monkeypatch.setattr(Reversals, "start", lambda *args: {**start(*args), "first_spin": 0.0})
     found = sweep.run(NEARLY_ROUND, b=1.00001)

@@ -210,7 +210,9 @@ def test_killed_at_any_moment(write: Write, tmp_path: Path, text: str, wanted: C
     ],
     ids=["some", "many", "late"],
 )
-def test_interrupted(runs: Runs, undisturbed: dict[str, bytes], when: tuple[str, ...]) -> None:
+def test_an_interrupted_run_resumes_with_the_same_files(
+    runs: Runs, undisturbed: dict[str, bytes], when: tuple[str, ...]
+) -> None:
     for moment in when:
         process = strike(runs, undisturbed, moment, signal.SIGINT)
         assert process is not None

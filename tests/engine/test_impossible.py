@@ -61,7 +61,7 @@ def test_impossible_bodies_have_a_status_and_no_numbers(edge: xr.Dataset) -> Non
     assert "set by accuracy in 9 cells, repeat in 1 cell" in "".join(accuracy(edge))
 
 
-def test_neighbours_do_not_notice(edge: xr.Dataset, write: Write) -> None:
+def test_neighbours_of_impossible_bodies_keep_their_numbers(edge: xr.Dataset, write: Write) -> None:
     alone = swept(write(TEXT), b=[3.0, 5.0], offset=[0.0, 0.3])
     same_numbers(edge.sel(b=[3.0, 5.0], offset=[0.0, 0.3]), alone)
 

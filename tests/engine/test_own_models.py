@@ -166,7 +166,7 @@ def test_what_does_not_compile_is_reported_with_its_line(
 
 
 @pytest.mark.campaign
-def test_its_body_settles_as_one_of_ours_and_reverses_no_more(folder: Path) -> None:
+def test_a_body_with_a_users_law_settles_and_reverses_no_more(folder: Path) -> None:
     """The page's law of friction, where the couple alone would stop it after minutes."""
     asked = {"fading": [0.1, 1.0], "omega3": [-5.0, -1.0, 0.5, 5.0]}
     ends, later, _ = settled(folder / "fading.yaml", 1.0, t_end=120, **asked)

@@ -126,7 +126,7 @@ def test_auto_runs_each_cell_with_its_cheapest_method(write: Write) -> None:
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_auto_resumes_from_a_checkpoint(write: Write, tmp_path: Path) -> None:
+def test_a_run_of_both_methods_resumes_from_a_checkpoint(write: Write, tmp_path: Path) -> None:
     file = write(MIXED.replace("60}\n", "120}\n") + "name: mixed\n")
     found, interruptions, _ = in_sittings(3, file, tmp_path / "out")
     assert interruptions >= 2

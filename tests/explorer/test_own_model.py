@@ -35,7 +35,7 @@ def setup(source: Source, folder: Path) -> Setup:
     return Setup(source, str(folder / "pendulum.py"), lambda _: None)
 
 
-def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_is_not_run_unless_it_is_named(source: Source, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweep.models.user.loading.load", lambda origin: pytest.fail(f"ran {origin.place}"))
     assert usable(source) is None
     with pytest.raises(InputError, match="refusing to run user code named inside a da"):
@@ -45,7 +45,7 @@ def test_unnamed_it_is_not_run(source: Source, folder: Path, monkeypatch: pytest
     assert source.values_at({"damping": 0, "torque": 1})
 
 
-def test_named_it_is_announced_and_gives_the_numbers_of_the_run(source: Source, folder: Path) -> None:
+def test_a_named_model_is_announced_and_gives_the_numbers_of_the_run(source: Source, folder: Path) -> None:
     said = list[str]()
     loading.load.cache_clear()
     setup = Setup(source, str(folder / "pendulum.py"), said.append)

@@ -56,7 +56,7 @@ def test_a_cell_in_the_address_names_no_more_than_it_has_to(source: Source, base
 
 
 @pytest.mark.parametrize(("query", "said"), HOSTILE.items(), ids=lambda text: text[:20])
-def test_nothing_else_gets_through(query: str, said: str, source: Source, base: state.Cell) -> None:
+def test_other_parameters_of_an_address_are_refused(query: str, said: str, source: Source, base: state.Cell) -> None:
     shown, (fault,) = read(query, source, base)
     assert shown == state.first(source)
     assert fault.startswith(said)

@@ -35,7 +35,7 @@ def test_late_reversals_come_at_the_reference_times(tolerance: float) -> None:
 
 
 @pytest.mark.campaign
-def test_so_they_do_for_a_real_body() -> None:
+def test_a_real_body_does_so_too() -> None:
     """The same body in SI, by its moments of inertia."""
     length, gravity, mass = 0.02, 9.81, 0.3
     time, cos, sin = np.sqrt(length / gravity), np.cos(0.03), np.sin(0.03)

@@ -75,7 +75,7 @@ def test_the_equations_and_the_energy_are_those_of_newton_and_euler(
 
 
 @pytest.mark.parametrize(("name", "law"), [("slip", "viscous"), ("noslip", None)])
-def test_so_are_those_of_the_papers_body(name: str, law: str | None) -> None:
+def test_frequencies_of_the_papers_body_are_those_of_the_equations(name: str, law: str | None) -> None:
     bodies = wide_bodies(100)
     for i in range(100):
         agree(name, {each: values[i] for each, values in bodies.items()}, law, i)

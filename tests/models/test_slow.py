@@ -198,7 +198,7 @@ def test_a_body_in_si_has_the_same_counts() -> None:
     np.testing.assert_array_equal(sweep.predict(asked).reversals_estimated.values, paper.reversals_estimated.values)
 
 
-def test_its_counts_are_called_estimated() -> None:
+def test_counts_of_the_slow_equations_are_called_estimated() -> None:
     """They are not simulated; a run that measures both has simulated ones as well, and a formula's are predicted."""
     alone = sweep.run(LINE | {"model": "slow"})
     assert alone.reversals.attrs["long_name"] == alone.reversals_estimated.attrs["long_name"]

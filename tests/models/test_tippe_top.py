@@ -45,7 +45,7 @@ def at_start(p: dict[str, float]) -> np.ndarray:
 @pytest.mark.parametrize(
     "more", [{"tilt": 1.0}, {"eccentricity": 0.2, "ratio": 1.4, "C": 0.35, "mu": 1.0, "n0": 5.0, "tilt": 0.4}]
 )
-def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
+def test_a_tippe_top_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
     top = TOP | more
     asked = {**top, "t_end": 15, "stop_early": False}
     one = sweep.trajectory(CONFIG, tolerance=1e-12, every=1.0, **asked)
@@ -56,7 +56,7 @@ def test_it_moves_as_newton_and_euler_say(more: dict[str, float]) -> None:
     np.testing.assert_allclose(one["inclination"], np.arccos(e[2]), rtol=0, atol=1e-7)
 
 
-def test_it_turns_over_while_energy_balances_and_jelletts_integral_stays() -> None:
+def test_a_tippe_top_turns_over_while_energy_balances_and_jelletts_integral_stays() -> None:
     one = sweep.trajectory(CONFIG, t_end=100, stop_early=False, **TOP)
     assert one["inclination"].min() < 0.2
     assert one["inclination"].max() > 3.0
@@ -70,7 +70,7 @@ def test_it_turns_over_while_energy_balances_and_jelletts_integral_stays() -> No
     np.testing.assert_allclose(one["jellett"], jellett, rtol=1e-8)
 
 
-def test_it_turns_over_completely_if_its_moments_are_in_the_published_range() -> None:
+def test_a_tippe_top_turns_over_completely_if_its_moments_are_in_the_published_range() -> None:
     """1 - α < A/C < 1 + α; below it does not turn over, above not completely."""
     tops = {**TOP, "mu": 1.0, "ratio": [0.6, 0.9, 1.1, 1.5]}
     ends = sweep.run(CONFIG, t_end=2000, stop_early=False, **tops)

@@ -74,7 +74,7 @@ def test_the_difference(cells: xr.Dataset) -> None:
         field(cells.drop_vars("reversals_predicted"), "difference")
 
 
-def test_labels(cells: xr.Dataset) -> None:
+def test_labels_have_words_and_units(cells: xr.Dataset) -> None:
     assert labels.label(cells, "mu") == "friction μ (1/√(g c))"
     assert labels.label(cells, "spin_final") == "final spin n (√(g/c))"
     assert labels.label(cells, "reversals") == "spin reversals, simulated"

@@ -43,7 +43,7 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
     assert flags == STATUSES == dict(enumerate(known)) | {8: "impossible"}
 
 
-def test_provenance(small: xr.Dataset) -> None:
+def test_a_dataset_records_where_it_comes_from(small: xr.Dataset) -> None:
     attributes = small.attrs
     assert attributes["Conventions"] == "CF-1.11"
     assert "t_end: 1500" in attributes["config"]

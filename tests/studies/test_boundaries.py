@@ -61,7 +61,7 @@ def test_a_smooth_root_takes_few_evaluations(at: float, steep: float, bent: floa
 
 
 @given(st.floats(0.01, 0.99))
-def test_a_step_is_bracketed_too(at: float) -> None:
+def test_a_jump_of_the_function_is_bracketed_too(at: float) -> None:
     root, calls = narrowed(lambda x: 1.0 if x > at else -1.0, 0.0, 1.0, 1e-6)
     assert root.low <= at <= root.high <= root.low + 1e-6
     assert calls <= 60
@@ -309,7 +309,7 @@ def test_a_curve_gets_points_where_it_is_not_as_smooth_as_its_points(sign: int) 
     assert all(middle.confirmed for middle in curve.middles.values())
 
 
-def test_a_smooth_curve_gets_none() -> None:
+def test_a_smooth_curve_gets_no_more_points() -> None:
     curve, _ = traced(lambda x: 0.5 + 0.1 * np.sin(3 * x), 20, 1e-3)
     assert len(curve.points) == 20
     assert len(curve.middles) == 19

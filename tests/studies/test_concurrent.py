@@ -35,7 +35,7 @@ def test_what_is_asked_at_the_same_time_is_one_batch_in_the_order_of_the_searche
         assert answer.batches == [[30, 10], [31], [32]]
 
 
-def test_others_do_not_go_on_when_one_was_enough() -> None:
+def test_searches_stop_when_one_was_enough() -> None:
     for _ in range(20):
         answer = Squares()
         searches = [partial(total, first=k, questions=k) for k in (5, 2, 2, 4)]

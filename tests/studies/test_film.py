@@ -174,7 +174,7 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
         (table("t,n", TIMES, SPINS).replace("\n1.", "\nlost 1."), ":13:", "(9 of 20 cells); write numbers only"),
     ],
 )  # fmt: skip
-def test_a_film_that_is_none_is_refused_in_one_line(write: Write, text: str, line: str, words: str) -> None:
+def test_a_table_that_is_not_a_film_is_refused_in_one_line(write: Write, text: str, line: str, words: str) -> None:
     path = write(text, "film.csv")
     with pytest.raises(InputError) as refusal:
         film.read(path)
@@ -216,7 +216,7 @@ def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
         )
 
 
-def test_a_film_in_seconds_is_none_of_a_body_in_the_paper_s_units(write: Write) -> None:
+def test_a_film_in_seconds_needs_a_body_in_si(write: Write) -> None:
     path = write(table("t (s),n", TIMES, SPINS), "film.csv")
     with pytest.raises(InputError, match=r"the film gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
         sweep.fit(write("friction: {mu: [30, 100]}\n"), path, ["mu"])
