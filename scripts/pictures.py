@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import matplotlib as mpl
 from playwright.sync_api import sync_playwright
 
 import sweep
@@ -40,7 +41,8 @@ def explorer() -> None:
 
 
 if __name__ == "__main__":
-    sweep.plot(sweep.run(CONFIGS / "mu_b.yaml", n0=0.05), output=STATIC / "map.png")
-    three = {"mu": [60, 130, 200]}
-    sweep.animate(CONFIGS / "mu.yaml", STATIC / "reversal.gif", at=three, t_end=220, begin=100, speed=30)
+    with mpl.rc_context({"figure.dpi": 150}):  # as wide as a page, so that its text keeps its size there
+        sweep.plot(sweep.run(CONFIGS / "mu_b.yaml", n0=0.05), width="220mm", title="", output=STATIC / "map.png")
+    shapes = {"b": [2, 3, 4]}
+    sweep.animate(CONFIGS / "mu.yaml", STATIC / "reversal.gif", at=shapes, mu=100, t_end=420, begin=100, speed=64)
     explorer()

@@ -51,14 +51,19 @@ class Axis:
 
 
 def contours(
-    values: Array, x: Axis, y: Axis, level: float = 0.0, *, corners: bool = False
+    values: Array, x: Axis, y: Axis, level: float = 0.0, *, corners: bool = False, to_edges: bool = False
 ) -> Iterator[tuple[Array, Array]]:
     """Where `values`, of shape (y, x), pass through `level`: the x and y of each curve, in order, on lines of the grid.
 
     There is no curve beside values that are NaN, or with `corners` between three others, which may end on a diagonal.
+    With `to_edges` curves go on to the edges of the outer cells, where the values are those of these cells.
     """
     if min(values.shape) < 2:
         return
-    grid = x.straight(x.values), y.straight(y.values), np.ma.masked_invalid(values)
-    for part in map(np.asarray, contour_generator(*grid, corner_mask=corners).lines(level)):
+    across, up = (axis.straight(axis.values) for axis in (x, y))
+    if to_edges:
+        values = np.pad(values, 1, mode="edge")
+        across, up = (np.insert(axis.straight(axis.edges[[0, -1]]), 1, axis.straight(axis.values)) for axis in (x, y))
+    generator = contour_generator(across, up, np.ma.masked_invalid(values), corner_mask=corners)
+    for part in map(np.asarray, generator.lines(level)):
         yield x.bent(part[:, 0]), y.bent(part[:, 1])

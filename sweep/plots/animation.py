@@ -145,12 +145,12 @@ class _Scene:
         for i, (one, each) in enumerate(zip(ones, moving, strict=True)):
             place = (i / bodies, 0.42, 1 / bodies, 0.55)
             axes: Any = self.figure.add_axes(place, projection="3d", computed_zorder=False)
-            axes.set_title(trajectories.label(dataset, i), fontsize=9, color=f"C{i}", y=0.8)
+            axes.set_title("", fontsize=9, color=f"C{i}", y=0.8)
             each.look(axes, half)
             for line in each.table(half):
                 axes.plot(*line, color="0.85", linewidth=0.6, zorder=0)
             (curve,) = over_time.plot([], [], color=f"C{i}", linewidth=1)
-            self.bodies.append(_Body(one, each, times, axes, curve))
+            self.bodies.append(_Body(one, trajectories.name(dataset, i), each, times, axes, curve))
         spins = np.append(np.concatenate([each.spin for each in self.bodies]), 0.0)
         margin = 0.08 * max(np.ptp(spins), 1e-12)
         over_time.set_ylim(spins.min() - margin, spins.max() + margin)
@@ -165,7 +165,9 @@ class _Scene:
 class _Body:
     """One body on its table, and its curve of n(t)."""
 
-    def __init__(self, one: xr.Dataset, moving: body.Moving, times: Array, axes: Any, curve: Line2D) -> None:
+    def __init__(self, one: xr.Dataset, name: str, moving: body.Moving, times: Array, axes: Any, curve: Line2D) -> None:
+        self._name, self._reversals = name, trajectories.reversal_times(one)
+        self._counts = "reversals" in one and TRAJECTORIES not in one.coords  # a film has a name
         self.axes, self.curve, self.times, self.moving = axes, curve, times, moving
         (self.spin,) = body.at(one, times, "spin")
         # Seen through the body, which covers most of it.
@@ -180,6 +182,8 @@ class _Body:
         for surface in list(self.axes.collections):
             surface.remove()
         self.axes.plot_surface(*at + place[:, None, None], **_SURFACE, **self.look)
+        count = labels.reversals(int((self._reversals <= self.times[frame]).sum()))
+        self.axes.title.set_text(f"{self._name}: {count}" if self._counts else self._name)
         self.trace.set_data_3d(*moving.path[:, : frame + 1], np.zeros(frame + 1))
         self.dot.set_data_3d(*([each] for each in place))
         self.curve.set_data(self.times[: frame + 1], self.spin[: frame + 1])

@@ -69,7 +69,7 @@ def draw(panels: Panels, frames: Frames, limits: Limits = AUTO) -> list[Artist]:
 def _panel(axes: Axes, chosen: xr.Dataset, names: list[str], x: str, kinds: dict[str, str]) -> dict[str, Artist]:
     """Draw one panel, with the words for the kinds of its cells; returns the entries for the legend."""
     entries: dict[str, Artist] = {}
-    described = [describe(chosen, name, x) for name in names]
+    described = [describe(chosen, name, x, shared={}) for name in names]
     first = described[0]
     at = first.x.values
     if len(at) == 1:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ import xarray as xr
 from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.plots import labels, scales, theory
-from sweep.plots.marks import BLANK, legend, marks
+from sweep.plots.marks import BLANK, legend, marks, shared_kinds
 from sweep.plots.pictures import of
 from sweep.plots.quantities import field
 from sweep.plots.scales import AUTO, Limits, Scale
@@ -38,10 +38,14 @@ class Map:
     marks: dict[str, Array]
     """Masks of the cells of each kind of `marks.WORDS`, shape (y, x)."""
     legend: dict[str, str]
-    """Legend entries of the kinds that occur."""
+    """Legend entries of the kinds that occur and are marked."""
+    notes: tuple[str, ...]
+    """Sentences on kinds that more than half of the cells share, which are not marked."""
     flags: dict[int, str]
     """The meaning of each value; empty if they are numbers."""
     lines: list[Line]
+    frame: tuple[Array, Array]
+    """The ends of the drawn axes x and y."""
 
     @property
     def blank(self) -> Array:
@@ -55,7 +59,7 @@ class Map:
         return self.values[~self.blank]
 
 
-def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
+def describe(dataset: xr.Dataset, name: str, x: str, y: str = "", shared: Mapping[str, str] | None = None) -> Map:
     """Describe the map of a variable, or its single row.
 
     Parameters
@@ -63,15 +67,29 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "") -> Map:
     dataset : all axes but `x` and `y` are fixed, and the values of these are in increasing order
     name : as `sweep.plots.quantities.field` takes it
     x, y : empty where there is no such axis
+    shared : kinds of cell that are not marked, with a sentence on each; by default those that more than half of the
+        cells share
     """
     found, kinds = field(dataset, name), marks(dataset, name)
+    notes = shared_kinds(dataset, name) if shared is None else shared
+    words = {kind: entry for kind, entry in legend(dataset, name).items() if kind not in notes}
     across, up = Axis(x, along(dataset, x)), Axis(y, along(dataset, y))
     lines = theory.lines(dataset, across, up) if y and of(name).theory else []
     lines += boundaries(dataset, across, up) if y and of(name).boundaries else []
     return Map(
-        name, across, up, table(found, across, up), {kind: table(where, across, up) for kind, where in kinds.items()},
-        legend(dataset, name), labels.flag_words(dataset.assign({name: found}), name), lines,
+        name, across, up, table(found, across, up),
+        {kind: table(where & (kind not in notes), across, up) for kind, where in kinds.items()},
+        words, tuple(notes.values()), labels.flag_words(dataset.assign({name: found}), name), lines,
+        (_ends(dataset, across), _ends(dataset, up)),
     )  # fmt: skip
+
+
+def _ends(dataset: xr.Dataset, axis: Axis) -> Array:
+    """Return the edges of the outer cells, but not beyond b = a, where the semi-axes would change their names."""
+    low, high = axis.edges[[0, -1]]
+    if axis.name == "b" and "a" in dataset and not dataset["a"].ndim and axis.values[-1] <= dataset["a"]:
+        high = min(high, float(dataset["a"]))
+    return np.array([low, high])
 
 
 def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
@@ -80,7 +98,9 @@ def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
     words = "boundary of counts"
-    curves = {level: list(contours(counts.distance(level), x, y, corners=True)) for level in counts.levels()}
+    curves = {
+        level: list(contours(counts.distance(level), x, y, corners=True, to_edges=True)) for level in counts.levels()
+    }
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 
 

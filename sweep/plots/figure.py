@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from math import ceil, log
@@ -48,7 +48,7 @@ _STYLE: dict[Any, Any] = {
 _PRINT: dict[Any, Any] = {"font.size": 7.5, "figure.dpi": 300}
 """Settings for print that replace these, so that no text is too small."""
 
-_LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.55, 0.17, 4
+_LETTER, _HANDLE, _LINE, _LINES = 0.058, 0.71, 0.17, 4
 """Inches per letter, entry and line of a legend, and the number of lines for which figures have room."""
 
 _OF_TITLE = 0.09
@@ -136,8 +136,8 @@ class Sheet(Figure):
         """All axes except bars and second axes, which have labels."""
         return [axes for axes in self.axes if not axes.get_label()]
 
-    def explain(self, handles: Sequence[Artist], panels: int = 0) -> None:
-        """Add a legend below the panels, in as many columns as fit, headed by the constants.
+    def explain(self, handles: Sequence[Artist], panels: int = 0, notes: Iterable[str] = ()) -> None:
+        """Add a legend below the panels, in as many columns as fit, headed by the constants and by `notes`.
 
         Parameters
         ----------
@@ -146,18 +146,19 @@ class Sheet(Figure):
         self._wrap_labels()
         if panels > MAX_PANELS:
             handles = [*handles, Line2D([], [], color="none", label=f"the first {MAX_PANELS} of {panels} panels")]
-        if not handles and not self._constants:
+        head = "\n".join(filter(None, [self._constants, *(constants_in_lines(note, self._width) for note in notes)]))
+        if not handles and not head:
             return
         room = max(1, int((self._width - _HANDLE) / _LETTER))
         words = [fill(str(handle.get_label()), room, break_long_words=False) for handle in handles]
         columns = _columns(words, self._width)
         self.legend(
             list(handles), [labels.in_maths(each) for each in words], loc="outside lower center", frameon=False,
-            handlelength=2.5, columnspacing=1.3, ncols=len(columns), title=self._constants or None,
+            handlelength=4, columnspacing=1.3, ncols=len(columns), title=head or None,
             alignment="left" if len(columns) == 1 else "center",
         )  # fmt: skip
         lines = max(sum(each.count("\n") + 1 for each in column) for column in columns)
-        lines += self._constants.count("\n") + 1
+        lines += head.count("\n") + 1
         more = max(0, lines - _LINES) * _LINE
         self.set_figheight(self.get_figheight() * (1 + more / self._height))
 
@@ -168,6 +169,12 @@ class Sheet(Figure):
             across, up = axes.bbox.size
             for text, length in ((axes.title, across), (axes.xaxis.label, across), (axes.yaxis.label, up)):
                 text.set_text(_wrapped(text.get_text(), int(length / letter), _UNIT))
+
+    def name(self, title: str) -> None:
+        """Give the figure a title; without one, a single panel has none either."""
+        self.suptitle(title)
+        for axes in self._panels if not title and len(self._panels) == 1 else []:
+            axes.set_title("")
 
     def letter(self) -> None:
         """Letters a, b, c at the panels, if there are several."""

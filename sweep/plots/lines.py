@@ -22,15 +22,15 @@ _STYLES: dict[str, dict[str, Any]] = {
 _BOX = {"boxstyle": "round,pad=0.08", "facecolor": "white", "edgecolor": "none"}
 
 
-def draw(axes: Axes, shown: Map, *, labelled: bool) -> dict[str, Line2D]:
+def draw(axes: Axes, shown: Map, width: float) -> dict[str, Line2D]:
     """Draw the lines of a map; returns their entries for the legend, by their words.
 
     Parameters
     ----------
-    labelled : whether there is room for words on the lines; without it, boundaries are left out
+    width : of the map in inches; zero if there is no room for words on the lines, so that boundaries are left out
     """
     box = axes.axis()
-    drawn, words = places.legible(shown.lines, shown.x, shown.y, room=labelled)
+    drawn, words = places.legible(shown.lines, shown.x, shown.y, width)
     for line in drawn:
         style = _STYLES[line.name]
         halo = [withStroke(linewidth=2 * style["linewidth"], foreground="white")]
@@ -51,8 +51,7 @@ def draw_vertical(axes: Axes, lines: list[Line]) -> dict[str, Line2D]:
     """Draw lines over curves; returns their entries for the legend."""
     for line in lines:
         for at in line.parts[0][0]:
-            style: Any = {"linestyle": _STYLES[line.name]["linestyle"], "color": mpl.rcParams["text.color"]}
-            axes.axvline(at, linewidth=0.8, gid=line.name, **style)
+            axes.axvline(at, color=mpl.rcParams["text.color"], gid=line.name, **_STYLES[line.name])
     return {line.name: entry(line.name, line.words) for line in lines}
 
 

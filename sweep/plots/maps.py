@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
@@ -13,7 +15,7 @@ from sweep.parameters import PARAMETERS
 from sweep.plots import hatches, labels, lines
 from sweep.plots.description import Map, common_scale, describe
 from sweep.plots.figure import RATIO, Sheet, arrangement, panel_width, set_scale
-from sweep.plots.marks import legend, with_results
+from sweep.plots.marks import legend, shared_kinds, with_results
 from sweep.plots.panels import Panel, Panels, title
 from sweep.plots.scales import AUTO, Limits, Scale, thinned
 
@@ -39,7 +41,8 @@ def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Shee
     All maps of a variable and of its prediction share a scale and its bar; the legend explains flags.
     """
     dataset, names = panels.dataset, panels.names + panels.compared
-    maps = _maps(panels, names)
+    shared = shared_kinds(panels.whole, names[0])
+    maps = _maps(panels, names, shared)
     count = len(names) * len(maps)
     rows, groups = arrangement(len(maps), len(names))
     columns = groups * len(names)
@@ -51,34 +54,37 @@ def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Shee
     for i, axes in enumerate(frames):
         k, name = i // len(names), names[i % len(names)]
         shown, compared = maps[k][name], name in panels.compared
-        entries |= _map(axes, shown, scales[name], labelled=width >= _SMALL, compared=compared)
+        entries |= _map(axes, shown, scales[name], width, compared=compared)
         axes.set_title(_title(panels, name, panels.each[k], topmost=i < columns))
         _label_axes(axes, dataset, shown, left=i % columns == 0, lowest=i + columns >= count, brief=width < _SMALL)
     for group in (panels.names, panels.compared):
         if group and not maps[0][group[0]].flags:
             of_group = [axes for i, axes in enumerate(frames) if names[i % len(names)] in group]
-            _bar(of_group, dataset, group[-1], scales[group[-1]], int(width * RATIO * rows / _TICK))
-    figure.explain([*_meanings(panels, maps, scales[names[0]]), *entries.values()])
+            words = labels.common(dataset, group[-1]) if panels.compared else labels.label(dataset, group[-1])
+            _bar(of_group, words, scales[group[-1]], int(width * RATIO * rows / _TICK))
+    meanings = _meanings(panels, maps, scales[names[0]], shared)
+    figure.explain([*meanings, *entries.values()], notes=shared.values())
     return figure
 
 
 def draw_in(axes: Axes, panels: Panels, limits: Limits, cmap: str | None) -> None:
     """Draw the map of the first variable into these axes, with its bar beside them."""
     name = panels.names[0]
-    shown = _maps(panels, [name])[0][name]
+    shown = _maps(panels, [name], {})[0][name]
     scale = common_scale([shown], limits, cmap)
-    _map(axes, shown, scale, labelled=True)
+    _map(axes, shown, scale, _WIDEST)
     _label_axes(axes, panels.dataset, shown)
-    _bar([axes], panels.dataset, name, scale)
+    _bar([axes], labels.label(panels.dataset, name), scale)
 
 
 Maps = list[dict[str, Map]]
 """For each panel of a dataset, the maps of its variables."""
 
 
-def _maps(panels: Panels, names: list[str]) -> Maps:
+def _maps(panels: Panels, names: list[str], shared: Mapping[str, str]) -> Maps:
     down, right = panels.across
-    return [{name: describe(panels.dataset.isel(panel), name, right, down) for name in names} for panel in panels.each]
+    parts = (panels.dataset.isel(panel) for panel in panels.each)
+    return [{name: describe(part, name, right, down, shared) for name in names} for part in parts]
 
 
 def _scales(panels: Panels, maps: Maps, limits: Limits, cmap: str | None) -> dict[str, Scale]:
@@ -89,8 +95,11 @@ def _scales(panels: Panels, maps: Maps, limits: Limits, cmap: str | None) -> dic
     }
 
 
-def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool = False) -> dict[str, Artist]:
-    """Draw one map; returns the legend entries of its lines.  A map that compares two others has fewer marks."""
+def _map(axes: Axes, shown: Map, scale: Scale, width: float, *, compared: bool = False) -> dict[str, Artist]:
+    """Draw one map, `width` inches wide; returns the legend entries of its lines.
+
+    A map that compares two others has fewer marks.
+    """
     set_scale(axes, "x", shown.x.values)
     set_scale(axes, "y", shown.y.values)
     values = np.ma.masked_where(shown.blank, shown.values)
@@ -98,11 +107,11 @@ def _map(axes: Axes, shown: Map, scale: Scale, *, labelled: bool, compared: bool
         shown.x.edges, shown.y.edges, values, cmap=scale.colours, norm=scale.norm, rasterized=values.size > 5000,
         gid=shown.name,
     )  # fmt: skip
-    axes.set(xlim=shown.x.edges[[0, -1]], ylim=shown.y.edges[[0, -1]])
+    axes.set(xlim=shown.frame[0], ylim=shown.frame[1])
     dark = ~shown.blank & (scale.lightness(values.filled(values.data.flat[0])) < 0.5)
     hatches.draw(axes, {kind: w for kind, w in shown.marks.items() if not compared or kind in _OF_DIFFERENCES},
                  (shown.y.edges, shown.x.edges), dark)  # fmt: skip
-    return dict(lines.draw(axes, shown, labelled=labelled))
+    return dict(lines.draw(axes, shown, width if width >= _SMALL else 0.0))
 
 
 def _title(panels: Panels, name: str, panel: Panel, *, topmost: bool) -> str:
@@ -110,9 +119,7 @@ def _title(panels: Panels, name: str, panel: Panel, *, topmost: bool) -> str:
     words, compared = labels.words(panels.dataset, name), name in panels.compared
     if panels.compared:
         words = words.rpartition(", ")[2] if compared else labels.origin(panels.dataset, name)
-    elif panel and not labels.flag_words(panels.dataset, name):
-        words = ""
-    if panels.compared and not topmost:
+    if not topmost if panels.compared else not labels.flag_words(panels.dataset, name):
         words = ""
     return "\n".join(filter(None, [words, title(panels.dataset, panel)]))
 
@@ -131,18 +138,18 @@ def _label_axes(
     axes.set(xlabel=x if lowest else "", ylabel=y if left else "")
 
 
-def _bar(beside: list[Axes], dataset: xr.Dataset, name: str, scale: Scale, most: int = 12) -> None:
-    """Draw the bar of a scale, with its label, to the right of the maps that share it."""
+def _bar(beside: list[Axes], words: str, scale: Scale, most: int = 12) -> None:
+    """Draw the bar of a scale, labelled with these words, to the right of the maps that share it."""
     figure = beside[0].figure
     bar = figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=beside, extend=scale.arrows, pad=0.02)
-    bar.set_label(labels.common(dataset, name))
+    bar.set_label(words)
     if scale.ticks:
         ticks = thinned(scale.ticks, most)
         bar.set_ticks(list(ticks), labels=list(ticks.values()))
         bar.ax.minorticks_off()
 
 
-def _meanings(panels: Panels, maps: Maps, scale: Scale) -> list[Artist]:
+def _meanings(panels: Panels, maps: Maps, scale: Scale, shared: Mapping[str, str]) -> list[Artist]:
     """Explain the colours of flags and the marks of cells, with the number of cells that have them."""
     handles: list[Artist] = []
     name, whole = panels.names[0], panels.whole
@@ -152,7 +159,7 @@ def _meanings(panels: Panels, maps: Maps, scale: Scale) -> list[Artist]:
             if count := int((found == value).sum()):
                 colour = scale.rgba(np.array(value)).tolist()
                 handles.append(Patch(facecolor=colour, edgecolor="0.3", label=f"{words} ({count})"))
-    kinds = legend(whole, name)
+    kinds = {kind: words for kind, words in legend(whole, name).items() if kind not in shared}
     if "no_value" in (compared := legend(whole, [*panels.names, *panels.compared][-1])):
         kinds["no_value"] = compared["no_value"]
     return [*handles, *(hatches.handle(kind, words) for kind, words in kinds.items())]

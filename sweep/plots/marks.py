@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT, Doubt
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
 from sweep.plots.labels import is_code
 from sweep.plots.pictures import of
 from sweep.plots.quantities import field
@@ -25,6 +25,9 @@ WORDS = {
     "uncertain": "uncertain count",
 }
 """The kinds of cell, and their meanings.  A cell may be of several kinds, but only one of the first four."""
+
+UNBOUNDED = "followed up to the time limit"
+"""Words for the kind `time_limit` where no cell has settled, as in a model that never settles."""
 
 BLANK = ("not_run", "failed", "impossible", "no_value")
 """The kinds of cell without a result to draw."""
@@ -72,6 +75,17 @@ def legend(dataset: xr.Dataset, name: str) -> dict[str, str]:
     return {kind: f"{_meaning(dataset, name, kind)} ({count})" for kind, count in counts.items() if count}
 
 
+def shared_kinds(dataset: xr.Dataset, name: str) -> dict[str, str]:
+    """Return a sentence on each kind of cells with a result that more than half of all cells share."""
+    found = {kind: where for kind, where in marks(dataset, name).items() if kind not in BLANK}
+    shares = {kind: (int(where.sum()), where.size) for kind, where in found.items()}
+    return {
+        kind: f"{_meaning(dataset, name, kind)}, in {f'all {size}' if count == size else f'{count} of {size}'} cells"
+        for kind, (count, size) in shares.items()
+        if 2 * count > size
+    }
+
+
 def with_results(dataset: xr.Dataset, name: str) -> Array:
     """The values of the cells that have a result to draw, shape (cells,)."""
     found, kinds = field(dataset, name), marks(dataset, name)
@@ -84,4 +98,7 @@ def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
         codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
-    return of(name).words.get(kind, WORDS[kind])
+    words = of(name).words.get(kind, WORDS[kind])
+    # What a model that never settles counts has no upper bound that a longer trajectory would reach.
+    endless = kind == "time_limit" and not (dataset["status"] == SETTLED).any()
+    return UNBOUNDED if endless else words

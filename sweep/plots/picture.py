@@ -142,7 +142,7 @@ def plot(
             if across:
                 drawn.letter()
             if title is not None:
-                drawn.suptitle(title)
+                drawn.name(title)
         figure = drawn
     if output is not None:
         save(figure, local_path(output))

@@ -98,12 +98,17 @@ def counts(values: Array, limits: Limits = AUTO, name: str | None = None) -> Sca
 
 
 def differences(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
-    """A diverging scale of integers, symmetric about zero, which has its own colour; `continuous` for mean ones."""
+    """A diverging scale of integers, whose colours are as strong on both sides of zero, which has its own.
+
+    It ends where the values do.  Mean differences have a `continuous` scale.
+    """
     if values.dtype.kind not in "iu":
         return continuous(values, limits, name)
-    top = max(round(float(np.abs(_given(limits) or values).max(initial=0))), 1)
-    side = _steps(top, _MAX_DIFFERENCES + 1)[1:]
-    return _stepped(np.concatenate([1 - side[::-1], side]), values, name or DIVERGING)
+    low, high = map(round, ends(limits, min(values.min(initial=0), 0), max(values.max(initial=0), 0)))
+    side = _steps(max(-low, high, 1), _MAX_DIFFERENCES + 1)[1:]
+    steps = np.concatenate([1 - side[::-1], side])
+    first, last = np.searchsorted(steps, [low, high], side="right")
+    return _stepped(steps, values, name or DIVERGING, slice(first - 1, last + 1))
 
 
 def continuous(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
@@ -112,11 +117,12 @@ def continuous(values: Array, limits: Limits = AUTO, name: str | None = None) ->
     low, high = ends(limits, *((finite.min(), finite.max()) if len(finite) else (0.0, 1.0)))
     if low == high:
         low, high = low - 0.1 * (abs(low) or 1.0), high + 0.1 * (abs(high) or 1.0)
-    if low < 0 < high:
-        high = max(-low, high)
-        return _smooth(finite, Normalize(-high, high), name or DIVERGING)
+    if low < 0 < high:  # as strong on both sides of zero
+        top = max(-low, high)
+        part = ((1 + low / top) / 2, (1 + high / top) / 2)
+        return _smooth(finite, Normalize(low, high), colour_map(name or DIVERGING), part)
     norm = LogNorm(low, high) if low > 0 and high > 100 * low else Normalize(low, high)
-    return _smooth(finite, norm, name or SEQUENTIAL)
+    return _smooth(finite, norm, colour_map(name or SEQUENTIAL))
 
 
 def ratios(values: Array, limits: Limits = AUTO, name: str | None = None) -> Scale:
@@ -134,7 +140,7 @@ def ratios(values: Array, limits: Limits = AUTO, name: str | None = None) -> Sca
     most = float(np.abs(np.log(finite)).max(initial=0.01))
     given = np.abs(np.log(_given(limits)))
     top = given.max() if given.size else min(most, log(_MAX_RATIO))
-    return _smooth(finite, LogNorm(exp(-top), exp(top)), name or DIVERGING)
+    return _smooth(finite, LogNorm(exp(-top), exp(top)), colour_map(name or DIVERGING))
 
 
 def flags(words: dict[int, str], name: str | None = None) -> Scale:
@@ -149,13 +155,15 @@ def _given(limits: Limits) -> list[float]:
     return [end for end in limits if end is not None]
 
 
-def _smooth(values: Array, norm: Normalize, name: str) -> Scale:
-    """A continuous scale, with arrows where values lie beyond it."""
+def _smooth(values: Array, norm: Normalize, colours: Colormap, part: tuple[float, float] = (0.0, 1.0)) -> Scale:
+    """A continuous scale, with arrows where values lie beyond it, of the colours between the ends `part` of 0 to 1."""
+    if part != (0.0, 1.0):
+        colours = ListedColormap(colours(np.linspace(*part, 256)))
     low, high = norm.vmin or 0.0, norm.vmax or 0.0
     arrows = _arrows(values, low, high)
     short = isinstance(norm, LogNorm) and 0.1 < low < high < 10  # without a power of ten
     ticks = {float(tick): f"{tick:.2g}" for tick in np.geomspace(low, high, 5)} if short else None
-    return Scale(colour_map(name), norm, ticks, arrows)
+    return Scale(colours, norm, ticks, arrows)
 
 
 def _arrows(values: Array, low: float, high: float) -> Arrows:
@@ -186,14 +194,26 @@ def _round(number: int) -> int:
     return max(n for n in (1, 2, 5) if n <= max(first, 1)) * int(10**others)
 
 
-def _stepped(steps: Array, values: Array, name: str) -> Scale:
-    """A colour for each of the ranges of integers that begin at `steps`."""
-    arrows = _arrows(values, steps[0], steps[-1] - 1)
-    number = len(steps) - 1 + {"both": 2, "neither": 0}.get(arrows, 1)
-    norm = BoundaryNorm(steps - 0.5, number, extend=arrows)
-    nearest_zero = (min(first, last - 1, key=abs) for first, last in pairwise(steps.tolist()))
-    ticks = {float(count): f"{count}".replace("-", "−") for count in nearest_zero}
-    return Scale(colour_map(name).resampled(number), norm, thinned(ticks, _MAX_TICKS), arrows)
+def _stepped(steps: Array, values: Array, name: str, shown: slice = slice(None)) -> Scale:
+    """A colour for each of the ranges of integers that begin at `steps`; the scale has the part `shown` of them.
+
+    A range of several integers is labelled with both its ends, so that a bar shows where ranges grow.
+    """
+    part = steps[shown]
+    arrows = _arrows(values, part[0], part[-1] - 1)
+    below, above = arrows in ("both", "min"), arrows in ("both", "max")
+    shades = colour_map(name)(np.linspace(0, 1, len(steps) - 1 + 2 * (below or above)))
+    begin = shown.indices(len(steps))[0] + (below or above) - below
+    colours = ListedColormap(shades[begin : begin + below + len(part) - 1 + above])
+    norm = BoundaryNorm(part - 0.5, colours.N, extend=arrows)
+    ticks = {(low + high - 1) / 2: _range(low, high - 1) for low, high in pairwise(part.tolist())}
+    return Scale(colours, norm, thinned(ticks, _MAX_TICKS), arrows)
+
+
+def _range(low: int, high: int) -> str:
+    """The words for the integers from `low` to `high`."""
+    ends = [f"{low}", f"{high}"] if low < high else [f"{low}"]
+    return ("–" if low >= 0 else " to ").join(ends).replace("-", "−")
 
 
 def thinned(ticks: dict[float, str], most: int) -> dict[float, str]:

@@ -206,12 +206,18 @@ def reversal_times(one: xr.Dataset) -> Array:
 
 
 def label(dataset: xr.Dataset, i: int) -> str:
-    """Its name, or the parameters that distinguish this trajectory from the others, and its number of reversals."""
+    """Return the name of a trajectory with its number of reversals."""
+    counted = "reversals" in dataset and TRAJECTORIES not in dataset.coords
+    return name(dataset, i) + (f": {labels.reversals(int(dataset['reversals'][i]))}" if counted else "")
+
+
+def name(dataset: xr.Dataset, i: int) -> str:
+    """Return the name of a trajectory, or the parameters that distinguish it from the others."""
     if TRAJECTORIES in dataset.coords:  # named, such as the film and its fit
         return str(dataset[TRAJECTORIES].values[i])
     names = _varying(dataset) or [name for name in ("n0", "omega3") if name in dataset]
-    named = ", ".join(labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
-    return f"{named}: {labels.reversals(int(dataset['reversals'][i]))}" if "reversals" in dataset else named
+    values = (labels.measured(dataset, name, float(np.ravel(dataset[name].values)[i])) for name in names)
+    return ", ".join(values) or labels.words(dataset, "spin")
 
 
 def constants_apart(dataset: xr.Dataset) -> xr.Dataset:

@@ -87,6 +87,19 @@ def test_the_first_reversal_is_in_the_middle_of_the_clip() -> None:
     assert animation._until(turning(2).assign_attrs(model_brings="a model")) == pytest.approx(10, rel=3e-3)
 
 
+def test_reversals_are_counted_as_they_happen() -> None:
+    """The spins vanish near t = 5; a film, which has a name, counts nothing."""
+    own = turning(2, n0=0.3).assign_attrs(model_brings="a model").assign(reversals=("trajectory", [1, 1]))
+    for dataset, name in ((own, "n₀ = 0.3"), (own.assign_coords(trajectory=["film", "fit"]), "film")):
+        scene = animation._Scene(dataset, np.linspace(0, 10, 11))
+        shown = []
+        for frame in (0, 4, 6, 10):
+            scene.show(frame)
+            shown.append(scene.bodies[0].axes.get_title())
+        counts = ["0 reversals", "0 reversals", "1 reversal", "1 reversal"]
+        assert shown == ([f"{name}: {count}" for count in counts] if name != "film" else ["film"] * 4)
+
+
 def test_all_bodies_have_one_scale() -> None:
     """Also a film's, whose contact point is not known to travel."""
     bodies = turning(2)

@@ -108,4 +108,4 @@ def test_a_map_and_the_last_lines_of_a_run_agree_on_the_number_of_uncertain_coun
     assert legend(small, "reversals")["uncertain"] == f"uncertain count ({number})"
     said = describe(small)
     assert f"\n{size - number} of {size} counts are certain; the others:\n" in said
-    assert sum(map(int, re.findall(r"^  (\d+) ", said, re.MULTILINE))) == number
+    assert sum(map(int, re.findall(r"^  (\d+)\b", said, re.MULTILINE))) == number

@@ -16,8 +16,8 @@ from support.figures import constants, entries, made, maps
 
 import sweep
 from sweep.config import InputError
-from sweep.kernels.status import DIVERGED, TIME_LIMIT, Doubt
-from sweep.plots import labels, panels, picture, scales
+from sweep.kernels.status import DIVERGED, SETTLED, TIME_LIMIT, Doubt
+from sweep.plots import labels, panels, picture, scales, theory
 from sweep.plots.hatches import outline
 from sweep.results.dataset import VARIABLES, described
 from sweep.results.netcdf import open_dataset, write
@@ -69,7 +69,7 @@ def test_a_boundary_is_drawn_with_its_number_or_not_at_all(width: str | None) ->
 
 def test_dots_at_uncertain_cells_can_be_seen_on_a_large_map() -> None:
     dataset = made(mu=np.linspace(20, 200, 60), b=np.linspace(2, 9, 60))
-    dataset["doubts"][:] = Doubt.STEP
+    dataset["doubts"][:20] = Doubt.STEP
     (dots,) = [line for line in maps(picture.plot(dataset, "reversals"))[0].lines if line.get_gid() == "uncertain"]
     assert dots.get_markersize() >= 2
 
@@ -101,10 +101,11 @@ def test_a_map_reads_no_more_of_a_file_than_it_shows(tmp_path: Path) -> None:
 def test_a_difference_is_coloured_evenly_about_zero() -> None:
     dataset = made()
     dataset["reversals_predicted"] += xr.where(dataset.mu > 100, -9, 3).astype("int16")
-    norm = mesh(maps(picture.plot(dataset))[2]).norm
-    np.testing.assert_array_equal(norm.boundaries, -norm.boundaries[::-1])
-    assert norm(0) == (norm.Ncmap - 1) / 2
-    assert norm.boundaries[-1] > 7
+    drawn = mesh(maps(picture.plot(dataset))[2])
+    assert drawn.norm.boundaries[[0, -1]].tolist() == [-5.5, 7.5]  # the bar ends where the values do
+    assert drawn.norm.extend == "neither"
+    whole = mpl.colormaps[scales.DIVERGING](np.linspace(0, 1, 15))  # from -7 to 7
+    np.testing.assert_allclose(drawn.cmap(drawn.norm(np.arange(-5, 8))), whole[2:], atol=0.01)
 
 
 def test_colours_of_different_values_differ_in_lightness() -> None:
@@ -128,7 +129,10 @@ def test_every_count_has_a_colour_and_high_ones_differ(top: int) -> None:
     assert (widths <= np.maximum(1, 0.8 * first)).all()
     assert (np.diff(widths) >= 0).all()
     assert (first[widths > 1] % np.gcd(widths[widths > 1], 10) == 0).all()
-    assert all(words == f"{round(at)}" for at, words in (scale.ticks or {}).items())
+    for at, words in (scale.ticks or {}).items():  # where steps grow, the bar says from where to where they go
+        k = np.searchsorted(scale.norm.boundaries, at) - 1
+        low, high = scale.norm.boundaries[k] + 0.5, scale.norm.boundaries[k + 1] - 0.5
+        assert words == (f"{low:.0f}" if low == high else f"{low:.0f}–{high:.0f}")
     assert len({tuple(c) for c in scale.rgba(first)}) == len(first)
 
 
@@ -141,6 +145,55 @@ def test_lower_bounds_are_hatched_and_explained() -> None:
         np.testing.assert_allclose(patch.get_path().get_extents().extents, [4.5, 50, 5.5, 70])
     assert not marked(predicted, "time_limit")
     assert any(text.startswith("lower bound") and "(1)" in text for text in entries(figure))
+
+
+@pytest.mark.parametrize(("limited", "settled"), [(4, True), (6, True), (10, False)])
+def test_what_most_cells_share_is_a_sentence_and_no_hatch(limited: int, settled: bool) -> None:
+    """A model that never settles has no lower bounds."""
+    dataset = made()
+    dataset["status"][:] = SETTLED
+    dataset["status"][:limited] = TIME_LIMIT
+    figure = picture.plot(dataset)
+    hatched = any(marked(axes, "time_limit") for axes in maps(figure))
+    words = "lower bound: time limit" if settled else "followed up to the time limit"
+    number = f"{8 * limited} of 80" if settled else "all 80"
+    assert hatched == (limited == 4)
+    assert (f"{words} ({8 * limited})" in entries(figure)) == hatched
+    assert (f"\n{words}, in {number} cells" in constants(figure)) == (not hatched)
+
+
+@pytest.mark.parametrize("variable", ["reversals", "status"])
+def test_a_map_without_a_title_has_none_at_all(variable: str) -> None:
+    figure = picture.plot(made(), variable, width="85mm", title="")
+    bars = [axes.get_ylabel() for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    assert bars == (["spin reversals, simulated"] if variable == "reversals" else [])
+    assert [axes.get_title() for axes in figure.axes if axes.get_title()] == []
+    assert figure.get_suptitle() == ""
+
+
+def test_a_map_ends_where_the_semi_axes_are_equal() -> None:
+    near, beyond = np.linspace(2, 9.8, 8), np.linspace(2, 12, 8)
+    for b, end in ((near, 10), (beyond, beyond[-1] + 5 / 7)):
+        assert maps(picture.plot(made(b=b), "reversals"))[0].get_xlim()[1] == pytest.approx(end)
+
+
+def test_boundaries_reach_the_frame() -> None:
+    one = made()
+    one = one.assign(margin_more=one.spin_final * 0 + 0.5, margin_fewer=one.spin_final * 0 + 0.5)
+    axes = maps(picture.plot(one, "reversals"))[0]
+    lines = [line.get_xdata() for line in axes.lines if line.get_gid() == "boundary"]
+    assert lines
+    assert all(sorted((x[0], x[-1])) == pytest.approx(axes.get_xlim()) for x in lines)
+
+
+def test_a_line_in_the_legend_has_the_dash_of_the_figure() -> None:
+    for dataset in (made(n0=[0.02]), made(n0=[0.02]).isel(b=3, n0=0)):
+        figure = picture.plot(dataset, "reversals")
+        named = {line.get_label(): line for line in figure.legends[0].get_lines()}
+        for line in (line for axes in figure.axes for line in axes.lines if line.get_gid() in ("n_c1", "n_c2", "best")):
+            begin = theory.WORDS.get(line.get_gid(), "b = ")
+            (entry,) = [each for words, each in named.items() if words.startswith(begin)]
+            assert (entry._dash_pattern, entry.get_linewidth()) == (line._dash_pattern, line.get_linewidth())
 
 
 def test_legends_are_never_over_the_data() -> None:
@@ -156,7 +209,7 @@ def test_legends_are_never_over_the_data() -> None:
 
 def test_hatches_stand_out_from_dark_and_light_cells() -> None:
     dataset = made()
-    dataset["status"][:] = TIME_LIMIT
+    dataset["status"][2:4], dataset["status"][8:] = TIME_LIMIT, TIME_LIMIT
     axes = maps(picture.plot(dataset))[0]
     white, black = marked(axes, "time_limit")
     assert to_rgb(white.get_edgecolor()) == (1, 1, 1)
@@ -236,8 +289,10 @@ def test_a_mean_difference_keeps_its_fraction() -> None:
 
 
 def test_signed_values_are_coloured_evenly_about_zero() -> None:
-    norm = mesh(maps(picture.plot(made(), "spin_final"))[0]).norm
-    assert (norm.vmin, norm.vmax) == (-0.1, 0.1)
+    drawn = mesh(maps(picture.plot(made(), "spin_final"))[0])
+    assert (drawn.norm.vmin, drawn.norm.vmax) == (-0.1, 0.02)
+    whole = mpl.colormaps[scales.DIVERGING]((1 + np.array([-1, -0.2, 0, 0.2])) / 2)  # from -0.1 to 0.1
+    np.testing.assert_allclose(drawn.to_rgba([-0.1, -0.02, 0, 0.02]), whole, atol=0.02)
 
 
 @pytest.mark.parametrize("starts", [1, 3, 4, 8])

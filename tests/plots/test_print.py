@@ -175,7 +175,7 @@ def test_settings_of_the_user_are_obeyed() -> None:
 
 @pytest.mark.parametrize(
     ("selection", "variable", "said"),
-    [({}, None, "spin reversals"), ({}, "status", "how the trajectory ended"), ({"mu": 0}, None, "L(f)")],
+    [({}, None, "spin reversals, simulated"), ({}, "status", "how the trajectory ended"), ({"mu": 0}, None, "L(f)")],
 )
 def test_a_picture_in_given_axes(selection: dict[str, int], variable: str | None, said: str) -> None:
     figure = Figure()

@@ -52,7 +52,9 @@ def whole() -> xr.Dataset:
 
 
 def titles(figure: Any) -> list[str]:
-    return [axes.get_title() for axes in figure.axes if axes.get_title()]
+    """The titles of the maps, or the words at the bar of a single one."""
+    found = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    return found or [axes.get_ylabel() for axes in figure.axes if axes.get_label() == "<colorbar>"]
 
 
 COUNTS = ["simulated", "predicted (Takano 2011)", "simulated − predicted"]

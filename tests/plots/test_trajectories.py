@@ -159,3 +159,11 @@ def test_plot_and_info_know_the_file_of_critical_spins(write: Write) -> None:
 def test_a_file_of_predictions_is_known(verb: str, small: xr.Dataset, tmp_path: Path) -> None:
     small[["reversals_predicted", "form_factor"]].to_netcdf(tmp_path / "p.nc")
     assert invoke(verb, tmp_path / "p.nc").exit_code == 0
+
+
+def test_the_legend_of_a_users_model_has_a_name() -> None:
+    """Also of a single trajectory, whose parameters may have any names."""
+    one = made([60.0]).assign_attrs(model_brings="a model", model_parameters="mu").drop_vars(["n0"], errors="ignore")
+    words = entries(picture.plot(one))
+    assert words[0].startswith("spin n")
+    assert all(words)
