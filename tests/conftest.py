@@ -59,8 +59,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         build([kernel(*each) for each in SHARED])
 
 
+LIGHT = ("config", "cli", "explorer", "plots", "results")
+"""Folders whose files take seconds."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what looks at instructions of x86 CPUs on others."""
+    """Run light files last, so that no process waits long for another; skip instructions of x86 CPUs on others."""
+    items.sort(key=lambda item: item.path.parent.name in LIGHT)
     if platform.machine().lower() not in ("x86_64", "amd64"):
         for item in items:
             if item.get_closest_marker("x86"):
