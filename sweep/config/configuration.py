@@ -19,12 +19,13 @@ from sweep.faults import InputError, Path
 from sweep.grid import CASE, SAMPLE, Grid
 from sweep.models import TIERS
 from sweep.models.general import laws
+from sweep.models.general.common import EXTRAS
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.variants import BASES, PAPER_LAW, Physics
-from sweep.parameters import Parameter, sections
+from sweep.parameters import PARAMETERS, Parameter, sections
 from sweep.units import NUMBER, PAPER_UNITS, SI, TIME, named
 from sweep.variables import attributes
 
@@ -44,7 +45,7 @@ def present(parameters: Mapping[str, Values]) -> list[str]:
     return [name for name, value in parameters.items() if name not in _ABSENT or value.spec != 0.0]
 
 
-_ABSENT = ("offset", "Ixz", "Iyz")
+_ABSENT = {name for each in EXTRAS.values() for name in each.parameters if PARAMETERS[name].default == 0}
 """Parameters whose value 0 is as if they were left out."""
 
 

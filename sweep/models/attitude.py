@@ -29,20 +29,20 @@ from sweep.models.vectors import Vector
 
 
 def of_rolling(contact):
-    """Make `Model.path` for the states (u1, u2, ω1, ω2, ω3) on a surface whose contact point `contact` gives."""
+    """Make `Model.path` for states that begin with (u1, u2, ω1, ω2, ω3), on a surface with this `contact` point."""
 
     def path(y, along, across, p):
-        return moving((*y, 0.0, 0.0), along, across, p)
+        return moving((*y[:5], 0.0, 0.0), along, across, p)
 
     moving = of_slipping(contact)
     return path
 
 
 def of_slipping(contact):
-    """As `of_rolling`, for the states (u1, u2, ω1, ω2, ω3, v1, v2)."""
+    """As `of_rolling`, for states that begin with (u1, u2, ω1, ω2, ω3, v1, v2)."""
 
     def path(y, along, across, p):
-        u1, u2, w1, w2, w3, v1, v2 = y
+        u1, u2, w1, w2, w3, v1, v2 = y[:7]
         (_, _, u3), inv_u3, _, _, dx = contact(u1, u2, Vector(w1, w2, w3), p)
         m1, m2, m3 = dx + Vector(v1, v2, -(v1 * u1 + v2 * u2) * inv_u3)
         square = u1 * u1 + u3 * u3

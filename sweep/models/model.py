@@ -110,6 +110,23 @@ def never_rocks(columns: Columns) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Assumptions:
+    """What holds in a scene.  Code that relies on one of these reads it here."""
+
+    isotropic: bool = True
+    """Whether all directions in the plane are alike: turned about the vertical, a start gives the same motion, turned.
+    The equations about upright spin then have constant coefficients, and half a turn of a body changes nothing."""
+    conservative: bool = True
+    """Whether only friction and couples change the energy above rest, so that it is never larger than at the start."""
+    steady_upright: bool = True
+    """Whether a body without rattle can spin upright at a constant rate, apart from couples that slow it."""
+
+
+PLAIN = Assumptions()
+"""All of them hold."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Tier:
     """One rung of the ladder of models: equations of motion, or a formula."""
 
@@ -210,6 +227,8 @@ class Model(Tier):
     units: str = OWN
     """Units of a user's model, for the labels: "paper", "SI" or "own"."""
 
+    assumes: Assumptions = PLAIN
+    """What holds in its scene."""
     variant: Any = None
     """The `sweep.models.general.common.Variant` behind a variant for any body; None for other models."""
 

@@ -37,6 +37,12 @@ _SOURCES: dict[Any, str] = {
 }
 
 
+_COMPARISONS = (np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal)
+
+_BRANCH = "a trace cannot follow a branch; instead of `if`, write np.minimum or np.maximum"
+_KNOWN = f"it knows whole powers and {', '.join(f'np.{ufunc.__name__}' for ufunc in _SOURCES)}"
+
+
 class Trace:
     """The expressions computed so far, each once, in the order of the source."""
 
@@ -83,12 +89,13 @@ class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
         if ufunc is np.power and isinstance(inputs[1], int) and inputs[1] > 0:
             return power(*inputs)
         if ufunc not in _SOURCES or method != "__call__" or options:
-            raise TypeError(f"{ufunc.__name__} is not known to a trace")
+            reason = _BRANCH if ufunc in _COMPARISONS else f"{ufunc.__name__} is not known to a trace"
+            raise TypeError(f"{reason}; {_KNOWN}")
         known = folded(ufunc, *inputs)
         return self.trace.node(_SOURCES[ufunc], *inputs) if known is None else known
 
     def __bool__(self) -> bool:
-        raise TypeError("a trace cannot follow a branch")
+        raise TypeError(f"{_BRANCH}; {_KNOWN}")
 
 
 def power(base: Any, exponent: int) -> Any:
@@ -147,23 +154,31 @@ def specialised(function: Callable[..., Any], **arguments: Any):
     arguments : for each argument of `function` in their order: None for a number, a count for a tuple of numbers, a
         `NamedTuple` class for one of those, and `Constants` for p, which comes last if there is one
 
-    If compilation by Numba is disabled, return `function` itself, in which a debugger can stop.
+    If compilation by Numba is disabled, call `function` itself, in which a debugger can stop.  Either way a tuple of
+    another length is an error.
     """
     if INTERPRETED:
-        return _interpreted(function, arguments["p"]) if "p" in arguments else function
+        return _interpreted(function, arguments)
     trace = Trace()
     result = function(*(_argument(trace, name, kind) for name, kind in arguments.items()))
     flat: list[Any] = []
     _flatten(result, flat)
     lines, names = trace.lines(flat)
-    lines.append(f"return {_source(result, trace, names)}")
+    counts = {name: kind for name, kind in arguments.items() if isinstance(kind, int)}
+    unpacked = [f"{tuple_of(f'{name}{i}' for i in range(n))} = {name}" for name, n in counts.items()]
+    lines = [*unpacked, *lines, f"return {_source(result, trace, names)}"]
     return compile_inline(function.__name__, ", ".join(arguments), lines, trace.names | {function.__name__: function})
 
 
-def _interpreted(function: Callable[..., Any], constants: Constants):
+def _interpreted(function: Callable[..., Any], kinds: Mapping[str, Any]):
     def plain(*arguments: Any) -> Any:
-        *others, p = arguments
-        return function(*others, constants.of(getattr(p, name) for name in constants.names))
+        taken = []
+        for value, (name, kind) in zip(arguments, kinds.items(), strict=True):
+            if isinstance(kind, int) and len(value) != kind:
+                raise ValueError(f"{name} has {len(value)} values, not {kind}")
+            known = isinstance(kind, Constants)
+            taken.append(kind.of(getattr(value, each) for each in kind.names) if known else value)
+        return function(*taken)
 
     return plain
 
@@ -172,7 +187,7 @@ def _argument(trace: Trace, name: str, kind: Any) -> Any:
     if kind is None:
         return trace.node(name)
     if isinstance(kind, int):
-        return tuple(trace.node(f"{name}[{i}]") for i in range(kind))
+        return tuple(trace.node(f"{name}{i}") for i in range(kind))
     if isinstance(kind, type):
         return kind(*(trace.node(f"{name}.{field}") for field in kind._fields))  # type: ignore[attr-defined]
     return kind(trace)

@@ -115,10 +115,10 @@ class Physics:
         start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
         couples = tuple(couple for couple in COUPLES.values() if self.names & {*couple.parameters})
         parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-        lies = self.names & {"offset"} & {*self.surface.constants}
-        has = {"offset": lies, "skew": self.names & {"Ixz", "Iyz"}, "gravity": self.units == SI}
-        extras = frozenset(extra for extra, named in has.items() if named)
-        return make(Variant(self.law if base == "slip" else None, couples, self.surface, extras), parameters)
+        named = {*self.names, *system}
+        extras = {n: each for n, each in EXTRAS.items() if named & {*each.parameters} and each.on(self.surface)}
+        parameters += tuple(name for each in extras.values() for name in each.parameters if name not in parameters)
+        return make(Variant(self.law if base == "slip" else None, couples, self.surface, frozenset(extras)), parameters)
 
     def misfits(self) -> dict[str, str]:
         """List the named parameters that are incompatible with the rest, and what to do about each."""

@@ -169,8 +169,10 @@ def _starts(config: Config, name: str, value: float) -> Range:
 def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
     """Return the names of the start point or tilt, where reversing both signs gives the same motion, half a turn later.
 
-    Half a turn maps a body onto itself unless it has an `Ixz` or `Iyz`.
+    Half a turn maps a body onto itself unless it has an `Ixz` or `Iyz`, and changes nothing if the plane is isotropic.
     """
+    if not config.equations.assumes.isotropic:
+        return []
     pairs = (pair for pair in (["x0", "y0"], ["pitch", "roll"]) if {*pair} <= free.keys())
     names = next((pair for pair in pairs if all(free[name].low == -free[name].high for name in pair)), [])
     others = ("Ixz", "Iyz", "omega1", "omega2", "slip1", "slip2")

@@ -11,6 +11,7 @@ from support.processes import python
 
 import sweep
 from sweep.kernels import source
+from sweep.models import symbols
 from sweep.models.ladder import slip
 from sweep.models.stiff import slip as stiff_slip
 
@@ -54,6 +55,35 @@ def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., 
     np.testing.assert_array_equal(step, compiled.step)
     np.testing.assert_allclose(spin, compiled.spin_final, rtol=1e-12)
     np.testing.assert_allclose(violation, compiled.energy_error, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda y: np.arctan(y[0]), "arctan is not known to a trace; it knows whole powers and np.negative, np.sqrt"),
+        (lambda y: y[0] if y[0] > y[1] else y[1], "cannot follow a branch; instead of `if`, write np.minimum"),
+        (lambda y: y[0] or y[1], "cannot follow a branch; instead of `if`"),
+        (lambda y: y[2], "tuple index out of range"),
+    ],
+    ids=["function", "comparison", "truth", "state"],
+)
+def test_equations_that_cannot_be_written_out_say_what_can(function: Callable[..., Any], said: str) -> None:
+    with pytest.raises((TypeError, IndexError), match=said):
+        symbols.specialised(function, y=2)
+
+
+@pytest.mark.parametrize("interpreted", [False, True])
+def test_a_state_vector_of_another_length_is_refused(interpreted: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(symbols, "INTERPRETED", interpreted)
+
+    def scaled(y: tuple[float, ...], scale: float) -> float:
+        return scale * y[0] + y[1]
+
+    total = symbols.specialised(scaled, y=2, scale=None)
+    assert total((1.0, 2.0), 3.0) == 5.0
+    for states in ((1.0,), (1.0, 2.0, 3.0)):
+        with pytest.raises(ValueError, match="values"):
+            total(states, 3.0)
 
 
 def test_the_printed_source_names_where_its_functions_are(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ from support.physics import KANE_LEVINSON
 from sweep.models import find, variants
 from sweep.models.general import rigid_body
 from sweep.models.general.bounds import strongest_grip
+from sweep.models.general.common import Variant
 from sweep.models.general.couples import COUPLES as KINDS
 from sweep.models.general.laws import LAWS
 from sweep.models.general.surfaces import ELLIPSOID, PARABOLOID, Surface
@@ -207,7 +208,7 @@ def test_the_slip_decays_no_faster_than_the_bound(surface: Surface) -> None:
     bowl = {"a": 0.005, "b": 0.222} if surface is PARABOLOID else {}
     body = cells(**(KANE_LEVINSON | bowl | FRICTION), n0=4.0, x0=0.0, y0=0.0)
     model = any_body("slip+viscous+paraboloid" if surface is PARABOLOID else "slip+viscous")
-    grip, random = strongest_grip(body, surface)[0], np.random.default_rng(3)
+    grip, random = strongest_grip(Variant(None, surface=surface), body)[0], np.random.default_rng(3)
 
     def draw() -> np.ndarray:
         return random.normal(size=7) * [0.1, 0.1, 4, 4, 4, 0, 0] * random.uniform()

@@ -5,14 +5,14 @@ The step of an explicit method, and the energy below which a law of friction is 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from sweep.models.general import rigid_body, starts
-from sweep.models.general.couples import Couple
+from sweep.models.general.common import Variant
 from sweep.models.general.rigid_body import about_centre
-from sweep.models.general.surfaces import ELLIPSOID, Surface
+from sweep.models.general.surfaces import Surface
 from sweep.models.model import Array, Columns
 from sweep.models.vectors import Vector
 
@@ -33,15 +33,15 @@ def faint_energy(speed: Array, columns: Columns, surface: Surface) -> Array:
     return np.asarray((speed / per_root) ** 2)
 
 
-def couples_decay(couples: Sequence[Couple], columns: Columns, surface: Surface) -> Array:
-    """Bound on the rate at which couples damp the angular velocity, shape (cells,)."""
+def couples_decay(scene: Variant, columns: Columns) -> Array:
+    """Bound on the rate at which the couples of a scene damp the angular velocity, shape (cells,)."""
     rate, about_normal = np.zeros_like(columns["a"]), np.zeros_like(columns["a"])
-    for couple in couples:
+    for couple in scene.couples:
         strength = couple.strongest(columns)
         if couple.about_normal:
-            about_normal = about_normal + strength * hardest_turn(columns, surface)
+            about_normal = about_normal + strength * hardest_turn(scene, columns)
         else:
-            rate = rate + (strength * _hardest_press(columns, surface) if couple.needs_normal_force else strength)
+            rate = rate + (strength * _hardest_press(scene, columns) if couple.needs_normal_force else strength)
     return np.asarray(rate / np.linalg.eigvalsh(rigid_body.matrix(rigid_body.inertia(columns)))[:, 0] + about_normal)
 
 
@@ -58,7 +58,7 @@ _AZIMUTHS, _SHARES, _ROUNDS = 4, 7, 6
 _FAINT, _FARTHEST, _BEYOND, _FLAT = 1e-6, 1.5, 1.01, 1e-30
 
 
-def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Vector, Array]]:
+def _attitudes(scene: Variant, columns: Columns) -> Iterator[tuple[Vector, Array]]:
     """Attitudes that a body may reach, at increasing tilts.
 
     Yields normals u with bounds on the normal force R, all of shape (azimuths, cells).
@@ -68,8 +68,10 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Vector, Arr
 
         φ'² <= 2 (E0 - g r) / (J_t + r'²),
 
-    where J_t is the least moment of inertia about the axis of tilting, with free spin.
+    where J_t is the least moment of inertia about the axis of tilting, with free spin.  Where the energy may grow, E0
+    allows for what it takes to fall over.
     """
+    surface = scene.surface
     p, E0 = rigid_body.constants(columns, surface), _energy_start(columns, surface)
     psi = np.linspace(0, np.pi, _AZIMUTHS, endpoint=False)[:, None] - rigid_body.axes(columns)
     cos, sin = np.cos(psi), np.sin(psi)
@@ -81,6 +83,8 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Vector, Arr
         """The height of G above that at rest, if the body is tilted by φ."""
         return np.asarray(surface.elevation(tilted(phi), p))
 
+    if not scene.assumes.conservative:
+        E0 = E0 + (p.g * height(np.full_like(psi, _FARTHEST))).max(axis=0)
     # The largest tilt that the energy allows.  Heights grow with its square at first, and more slowly later.
     k11, k12, k22, _ = surface.stiffness(p)
     energy = np.maximum(E0, 0) / p.g
@@ -101,29 +105,29 @@ def _attitudes(columns: Columns, surface: Surface) -> Iterator[tuple[Vector, Arr
         yield u, p.g + np.maximum(bend, 0) * square
 
 
-def _hardest_press(columns: Columns, surface: Surface) -> Array:
+def _hardest_press(scene: Variant, columns: Columns) -> Array:
     """Bound on the normal force over the trajectory, per unit mass, shape (cells,)."""
-    return np.asarray(np.max([R for _, R in _attitudes(columns, surface)], axis=(0, 1)))
+    return np.asarray(np.max([R for _, R in _attitudes(scene, columns)], axis=(0, 1)))
 
 
-def hardest_turn(columns: Columns, surface: Surface) -> Array:
+def hardest_turn(scene: Variant, columns: Columns) -> Array:
     """Bound on R uᵀ J⁻¹ u over the trajectory, shape (cells,): the decay of the spin per unit of its resistance."""
-    p = rigid_body.constants(columns, surface)
-    return np.asarray(np.max([R * u.dot(about_centre(u, p)) for u, R in _attitudes(columns, surface)], axis=(0, 1)))
+    p = rigid_body.constants(columns, scene.surface)
+    return np.asarray(np.max([R * u.dot(about_centre(u, p)) for u, R in _attitudes(scene, columns)], axis=(0, 1)))
 
 
-def strongest_grip(columns: Columns, surface: Surface = ELLIPSOID) -> Array:
+def strongest_grip(scene: Variant, columns: Columns) -> Array:
     """Bound on the decay rate of the slip per unit of friction's resistance, shape (cells,).
 
     Friction on a slip v changes it by -R k (1 + G) v with G = -[x_p] J⁻¹ [x_p], where [x] is the matrix of x ×.  One
     eigenvalue of G is zero, along x_p.  The sum of the others is the trace of G, and their product is
     |x_p|² x_pᵀ J x_p / det J.
     """
-    p, contact = rigid_body.constants(columns, surface), rigid_body.contact_on(surface)
+    p, contact = rigid_body.constants(columns, scene.surface), rigid_body.contact_on(scene.surface)
     volume = p.J11 * p.J22 * p.J33 - p.J11 * p.J23**2 - p.J22 * p.J13**2
     trace_of_inverse = p.inv_J11 + p.inv_J22 + p.inv_J33
     worst = np.zeros_like(columns["a"])
-    for u, R in _attitudes(columns, surface):
+    for u, R in _attitudes(scene, columns):
         _, _, x_p, _, _ = contact(u.x, u.y, Vector(0.0, 0.0, 0.0), p)
         square = x_p.dot(x_p)
         half = 0.5 * (trace_of_inverse * square - x_p.dot(about_centre(x_p, p)))

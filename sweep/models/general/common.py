@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from sweep.models.general import rigid_body, validity
 from sweep.models.general.couples import Couple
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.surfaces import ELLIPSOID, Surface
-from sweep.models.model import Array, Columns, Offer, named, zeros
+from sweep.models.model import PLAIN, Array, Assumptions, Columns, Offer, named, zeros
 from sweep.models.symbols import Constants, specialised
 
 SOLID = "solid"
@@ -22,13 +22,37 @@ SOLID = "solid"
 
 VISCOUS = LAWS["viscous"]
 
-EXTRAS: dict[str, dict[str, float]] = {
-    "offset": {"offset": 0.0},
-    "skew": dict.fromkeys(("J13", "J23", "inv_J12", "inv_J13", "inv_J23"), 0.0),
-    "gravity": {"g": 1.0},
-}
-"""Properties that the paper's body lacks: a centre of mass away from the ellipsoid's, a third axis that is not an axis
-of inertia, and gravity in other units; with the constants that are known without each."""
+
+@dataclass(frozen=True, kw_only=True)
+class Extra:
+    """A property that the paper's scene lacks."""
+
+    parameters: tuple[str, ...]
+    """The parameters that bring it."""
+    without: Mapping[str, float]
+    """The constants that are known without it, and their values."""
+    constants: Mapping[str, Callable[[Columns], Array]] = field(default_factory=dict)
+    """Those of these constants that are not of the body or its surface: (columns) -> values of shape (cells,)."""
+    states: tuple[str, ...] = ()
+    """States that follow those of the scene without it."""
+    start: Callable[[tuple[Array, ...]], tuple[Array, ...]] = lambda y: ()
+    """(the other states at t = 0) -> these states, each of shape (cells,)."""
+    on: Callable[[Surface], bool] = lambda surface: True
+    """Whether it makes a difference to a body with this surface."""
+    assumes: Assumptions = PLAIN
+    """What holds with it."""
+
+
+EXTRAS: dict[str, Extra] = {
+    "offset": Extra(parameters=("offset",), without={"offset": 0.0}, on=lambda surface: "offset" in surface.constants),
+    "skew": Extra(
+        parameters=("Ixz", "Iyz"), without=dict.fromkeys(("J13", "J23", "inv_J12", "inv_J13", "inv_J23"), 0.0),
+        assumes=Assumptions(steady_upright=False),
+    ),
+    "gravity": Extra(parameters=("gravity",), without={"g": 1.0}),
+}  # fmt: skip
+"""A centre of mass away from the ellipsoid's, a third axis that is not an axis of inertia, and gravity in other units.
+"""
 
 
 @dataclass(frozen=True)
@@ -55,17 +79,41 @@ class Variant:
         """Whether the third axis may differ from an axis of inertia."""
         return "skew" in self.extras
 
+    @cached_property
+    def has(self) -> tuple[Extra, ...]:
+        """Its extras."""
+        return tuple(each for name, each in EXTRAS.items() if name in self.extras)
+
+    @property
+    def assumes(self) -> Assumptions:
+        """What holds in this scene: what holds with each of its extras."""
+        holds = {name: all(getattr(each.assumes, name) for each in self.has) for name in vars(PLAIN)}
+        return Assumptions(**holds)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states that its extras add."""
+        return tuple(name for each in self.has for name in each.states)
+
+    def start(self, y: tuple[Array, ...]) -> tuple[Array, ...]:
+        """The states at t = 0, of which y are those without extras."""
+        return (*y, *(value for each in self.has for value in each.start(y)))
+
     @property
     def known(self) -> dict[str, float]:
         """The constants that are known, and their values."""
         return {
-            name: value for extra, each in EXTRAS.items() if extra not in self.extras for name, value in each.items()
+            name: value
+            for extra, each in EXTRAS.items()
+            if extra not in self.extras
+            for name, value in each.without.items()
         }
 
     @cached_property
     def body(self) -> tuple[str, ...]:
-        """The constants of body and surface that are not known."""
-        return tuple(name for name in (*self.surface.constants, *rigid_body.BODY) if name not in self.known)
+        """The constants of body, surface and extras that are not known."""
+        names = (*self.surface.constants, *rigid_body.BODY, *(name for each in self.has for name in each.constants))
+        return tuple(name for name in names if name not in self.known)
 
     def record(
         self, more: Sequence[str] = (), of_more: Callable[[Columns], tuple[Array, ...]] = lambda columns: ()
@@ -74,13 +122,15 @@ class Variant:
 
         Its `of` raises a ValueError for bodies that this scene does not cover.
         """
-        body, couples, surface, known = self.body, self.couples, self.surface, self.known
+        body, couples, surface, known, has = self.body, self.couples, self.surface, self.known, self.has
 
         class Record(named(*body, *(name for couple in couples for name in couple.constants), *more)):  # type: ignore[misc]
             @classmethod
             def of(cls, columns: Columns) -> Record:
                 names = (*surface.constants, *rigid_body.BODY)
                 of_body = dict(zip(names, rigid_body.values(columns, surface), strict=True))
+                for each in has:
+                    of_body |= {name: value(columns) for name, value in each.constants.items()}
                 if others := [name for name in known if name in of_body and np.any(of_body[name] != known[name])]:
                     raise ValueError(f"{', '.join(others)}: this scene has no such body; name it in the variant")
                 of_couples = (value for couple in couples for value in couple.of(columns))
@@ -93,10 +143,11 @@ class Variant:
         return specialised(function, **arguments, p=Constants(record._fields, self.known))
 
 
-def offers(couples: Sequence[Couple], *, dissipates: bool) -> frozenset[Offer]:
+def offers(scene: Variant, *, dissipates: bool) -> frozenset[Offer]:
     """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
-    theory = {Offer.LINEAR} if dissipates and all(couple.linear for couple in couples) else set()
-    return frozenset({Offer.COUNT, Offer.SPIN, Offer.ENERGY} | theory)
+    linear = dissipates and scene.assumes.isotropic and all(couple.linear for couple in scene.couples)
+    found = {Offer.COUNT: True, Offer.SPIN: True, Offer.ENERGY: scene.assumes.conservative, Offer.LINEAR: linear}
+    return frozenset(offer for offer, holds in found.items() if holds)
 
 
 @inline
@@ -111,6 +162,7 @@ def of_any_body(variant: Variant) -> dict[str, Any]:
     return {
         "name": variant.name,
         "variant": variant,
+        "assumes": variant.assumes,
         "spin_state": 4,
         "tilt": tilt,
         "slower_period": lambda columns: rigid_body.slower_period(columns, surface),

@@ -228,7 +228,7 @@ def contact_on(surface: Surface):
 
 @cache
 def energy_on(surface: Surface):
-    """(states of `slip`, constants) -> (spin n, energy of the rattle, J33), per unit mass.
+    """(states that begin with those of `slip`, constants) -> (spin n, energy of the rattle, J33), per unit mass.
 
     E = ωᵀJω/2 + |v_g|²/2 + g height is split using ω = n u + o, o ⊥ u.  Every term except J33 n²/2 is quadratic
     in small quantities and is computed as such: no difference of numbers of order one is taken.  But if J13 or J23 does
@@ -236,7 +236,7 @@ def energy_on(surface: Surface):
     """
 
     def energy(y, p):
-        u1, u2, w1, w2, w3, v1, v2 = y
+        u1, u2, w1, w2, w3, v1, v2 = y[:7]
         c3 = 1.0 - (u1 * u1 + u2 * u2)
         u, w = Vector(u1, u2, -np.sqrt(c3)), Vector(w1, w2, w3)
         a, rho, _ = surface.point(u, c3, p)

@@ -31,11 +31,11 @@ TURN = ("turn1", "turn2", "W11", "W12", "W22")
 
 
 def of_velocities(surface: Surface, *, skew: bool) -> Ripple:
-    """The ripple of the spin from the states of `slip`."""
+    """The ripple of the spin from states that begin with those of `slip`."""
 
     @inline
     def value(y, p, k):
-        u1, u2, w1, w2, w3, v1, v2 = y
+        u1, u2, w1, w2, w3, v1, v2 = y[:7]
         M1 = k[4] * w1 + k[6] * v2 + w3 * (k[7] * u1 + k[8] * u2)
         M2 = k[5] * w2 - k[6] * v1 + w3 * (k[8] * u1 + k[9] * u2)
         return ripple(u1, u2, M1, M2, k)

@@ -20,6 +20,8 @@ from sweep.models.general.rigid_body import about_contact, contact_on, energy_on
 from sweep.models.model import Array, Model, Offer, Ripple
 from sweep.models.vectors import Vector
 
+STATES = ("u1", "u2", "omega1", "omega2", "omega3")
+
 
 def equations(variant: Variant):
     """(states, constants) -> (derivatives, (n, power of couples, R, Painlevé denominator)), of a scene."""
@@ -47,16 +49,16 @@ def equations(variant: Variant):
 
 def rolling(variant: Variant, parameters: tuple[str, ...]) -> Model:
     """The model of a scene without slip; `parameters` are those of the body and the start."""
-    couples, surface = variant.couples, variant.surface
+    surface, states, holds = variant.surface, (*STATES, *variant.states), variant.assumes
     record, contact, slipping_energy = variant.record(), contact_on(surface), energy_on(surface)
     rippling = ripple.of_velocities(surface, skew=variant.skew)
-    rhs = variant.inline(record, equations(variant), y=5)
+    rhs = variant.inline(record, equations(variant), y=len(states))
 
     def point(y, p):
         return contact(y[0], y[1], Vector(*y[2:5]), p)[2]
 
     def energy(y, p):
-        return slipping_energy((*y, 0.0, 0.0), p)
+        return slipping_energy((*y[:5], 0.0, 0.0), p)
 
     def observe(y: Array, p) -> dict[str, Array]:
         x_p, (_, (_, _, R, _)) = contact_point(y, p), rhs(y, p)
@@ -64,27 +66,28 @@ def rolling(variant: Variant, parameters: tuple[str, ...]) -> Model:
 
     @inline
     def ripple_value(y, p, k):
-        u1, u2, w1, w2, w3 = y
+        u1, u2, w1, w2, w3 = y[:5]
         return of_slipping((u1, u2, w1, w2, w3, 0.0, 0.0), p, k)
 
-    of_slipping, contact_point = rippling.value, variant.inline(record, point, y=5)
+    of_slipping, contact_point = rippling.value, variant.inline(record, point, y=len(states))
     return Model(
         **of_any_body(variant),
         summary="rolling without slip, the limit of infinite friction",
-        states=("u1", "u2", "omega1", "omega2", "omega3"),
-        parameters=(*parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=offers(couples, dissipates=bool(couples)) | {Offer.REVERSAL_TIME},
+        states=states,
+        parameters=(*parameters, *(each for couple in variant.couples for each in couple.parameters)),
+        offers=offers(variant, dissipates=bool(variant.couples))
+        | ({Offer.REVERSAL_TIME} if holds.isotropic and holds.conservative else set()),
         constants=record,
-        start=lambda columns: starts.rolling(columns, surface),
-        fastest_decay=lambda columns: couples_decay(couples, columns, surface),
-        upright=lambda spin: (0.0, 0.0, 0.0, 0.0, -spin),
+        start=lambda columns: variant.start(starts.rolling(columns, surface)),
+        fastest_decay=lambda columns: couples_decay(variant, columns),
+        upright=lambda spin: tuple(-spin if name == "omega3" else 0.0 for name in states),
         rhs=rhs,
-        energy=variant.inline(record, energy, y=5),
+        energy=variant.inline(record, energy, y=len(states)),
         # Nothing damps an error: with 0.07 the energy drifts by a share of 2e-7 in t = 1000, with this by 6e-10.
         radians_a_step=0.022,
         ripple=Ripple(rippling.names, rippling.of, ripple_value),
         observe=observe,
-        path=variant.inline(record, attitude.of_rolling(contact), y=5, along=None, across=None),
+        path=variant.inline(record, attitude.of_rolling(contact), y=len(states), along=None, across=None),
     )
 
 

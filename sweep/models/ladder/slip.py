@@ -79,20 +79,21 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
 
     def fastest_decay(columns: Columns) -> Array:
         """Bound on the rate at which friction stops the slip, over the whole trajectory, shape (cells,)."""
-        decay = law.strongest(columns) * strongest_grip(columns, surface) + couples_decay(couples, columns, surface)
+        decay = law.strongest(columns) * strongest_grip(variant, columns) + couples_decay(variant, columns)
         if law.strongest_couple:
-            decay = decay + law.strongest_couple(columns) * hardest_turn(columns, surface)
+            decay = decay + law.strongest_couple(columns) * hardest_turn(variant, columns)
         return np.asarray(decay)
 
+    states, holds = (*STATES, *variant.states), variant.assumes
     record = variant.record((*law.parameters, *(() if law.linear_to is None else ("faint",))), more)
     contact = contact_on(surface)
-    rhs = variant.inline(record, equations(variant), y=7)
-    path = variant.inline(record, attitude.of_slipping(contact), y=7, along=None, across=None)
+    rhs = variant.inline(record, equations(variant), y=len(states))
+    path = variant.inline(record, attitude.of_slipping(contact), y=len(states), along=None, across=None)
 
     def moving_point(y, p):
         return contact(y[0], y[1], Vector(*y[2:5]), p)[2::2]
 
-    seen = variant.inline(record, moving_point, y=7)
+    seen = variant.inline(record, moving_point, y=len(states))
 
     def observe(y: Array, p) -> dict[str, Array]:
         """Contact point, slip v_p, v̇_p, v̇_0 and normal force.
@@ -115,25 +116,24 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         }
 
     linear = law.linear_to is None
-    ending = (
-        law == VISCOUS and not variant.skew and all(each.linear and not each.needs_normal_force for each in couples)
-    )
+    steady = holds.isotropic and holds.conservative and holds.steady_upright
+    ending = law == VISCOUS and steady and all(each.linear and not each.needs_normal_force for each in couples)
     return Model(
         **of_any_body(variant),
         summary="full equations with slip friction (Takano 2011, Ldot … visf)",
-        states=STATES,
+        states=states,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=offers(couples, dissipates=law.coupled is None)
-        | ({Offer.REVERSAL_TIME} if law == VISCOUS else set())
+        offers=offers(variant, dissipates=law.coupled is None)
+        | ({Offer.REVERSAL_TIME} if law == VISCOUS and holds.isotropic and holds.conservative else set())
         | ({Offer.ENDING} if ending else set())
         # A couple slows the spin of a body that does not rattle; skips do not allow for that.
         | ({Offer.MODES} if ending and not couples else set()),
         constants=record,
-        start=lambda columns: starts.slipping(columns, surface),
+        start=lambda columns: variant.start(starts.slipping(columns, surface)),
         fastest_decay=fastest_decay,
-        upright=lambda spin: (0.0, 0.0, 0.0, 0.0, -spin, 0.0, 0.0),
+        upright=lambda spin: tuple(-spin if name == "omega3" else 0.0 for name in states),
         rhs=rhs,
-        energy=variant.inline(record, energy_on(surface), y=7),
+        energy=variant.inline(record, energy_on(surface), y=len(states)),
         ripple=ripple.of_velocities(surface, skew=variant.skew),
         observe=observe,
         path=path,

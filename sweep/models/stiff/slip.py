@@ -40,10 +40,11 @@ def has_form(model: Model) -> bool:
 
     The law has to be viscous.  A step that may be long compared with the decay of the slip is of use only where the
     slip remains at the value that follows from the slow motion.  With the other laws slip begins and ends within times
-    that dopri5 resolves anyway.
+    that dopri5 resolves anyway.  The plane has to be isotropic and the scene conservative: these equations hold for
+    gravity along the normal and for no other force.
     """
     of = model.variant
-    if model.origin or of is None or of.law != VISCOUS:
+    if model.origin or of is None or of.law != VISCOUS or not (of.assumes.isotropic and of.assumes.conservative):
         return False
     return not any(couple.needs_normal_force for couple in of.couples)
 
@@ -136,7 +137,7 @@ def _form_of(scene: Variant) -> StiffForm:
         time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
         slip_decay=lambda columns: 2.2 * (rest_decay(columns) + rigid_body.spin_unit(columns)),
         rest_decay=rest_decay,
-        damping=lambda columns: couples_decay(couples, columns, surface),
+        damping=lambda columns: couples_decay(scene, columns),
     )
 
 
