@@ -155,7 +155,7 @@ def test_parameters_are_known_to_settings_messages_and_tables(folder: Path) -> N
         ("torque", -1.0, "torque: must be a finite number >= 0 and < 10, not -1"),
         ("body.a", 3.0, "body.a: unknown key; the keys here are damping"),
         ("units", "SI", "units: the file of the model gives the units; leave them out"),
-        ("integrator.method", "adams", "cannot run the pendulum model; choose dopri5 or auto"),
+        ("integrator.method", "adams", "cannot run the pendulum model; choose dopri5"),
         ("measure", ["energy_error"], "energy_error cannot be measured on the pendulum model; choose from reversals"),
     ):
         with pytest.raises(InputError, match=message):

@@ -10,7 +10,9 @@ from support.physics import MOMENTS, stone
 
 import sweep
 from sweep import InputError, load_config
-from sweep.faults import fault_of
+from sweep.faults import either, fault_of
+from sweep.kernels.methods import AUTO, METHODS
+from sweep.models import TIERS
 
 
 def small(old: str, new: str) -> str:
@@ -54,9 +56,9 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (mu("[40, 40.0]"), 3, "friction.mu", "equal values on one axis; keep each once"),
     (small("friction: {mu: [40, 60]}\n", ""), 1, "friction.mu", "missing; give a finite number >= 0"),
     (small("x0: 0.01", "x0: 11"), 4, "start.x0", "start point off the ellipsoid at x0=11, y0=0.01, a=10, b=2, delta=0.03; keep (x/a)² + (y/b)² < 1"),
-    (SMALL + "model: slippery\n", 6, "model", "must be slip, noslip, effective, averaged, slow, analytic or a Python file such as my_model.py, not 'slippery' (did you mean slip?)"),
-    (step("method: euler"), 5, "integrator.method", "must be dopri5, adams or auto, not 'euler'"),
-    ("model: averaged\nfriction: {mu: 60}\nintegrator: {method: adams}\n", 3, "integrator.method", "cannot run the averaged model; choose dopri5 or auto"),
+    (SMALL + "model: slippery\n", 6, "model", f"must be {', '.join(TIERS)} or a Python file such as my_model.py, not 'slippery' (did you mean slip?)"),
+    (step("method: euler"), 5, "integrator.method", f"must be {either([*METHODS, AUTO])}, not 'euler'"),
+    ("model: averaged\nfriction: {mu: 60}\nintegrator: {method: adams}\n", 3, "integrator.method", "cannot run the averaged model; choose dopri5"),
     ("model: noslip\nfriction: {mu: [20, 60]}\n", 2, "friction.mu", "the noslip model has no mu; its param"),
     ("model: analytic\nfriction: {mu: 60}\nstart: {x0: [0.01, 0.02]}\n", 3, "start.x0", "the analytic model has no x0"),
     ("model: effective\nfriction: {mu: 60}\nmeasure: [reversals, energy_error]\n", 3, "measure[1]", "energy_error cannot be measured on the effective model"),
@@ -114,7 +116,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "has no meaning with surface: paraboloid; give the elements of inertia instead"),
     (stone(BOWL, ("offset: 0.01", "offset: 0.02")), 4, "body", "centre of mass outside the paraboloid; keep offset < c (at a=0.01"),
     (stone(("model: slip", "model: averaged"), ("{a:", "{surface: paraboloid, a:")), 1, "model", "units: SI, surface: paraboloid; choose slip or noslip"),
-    (stone(("t_end: 5", "t_end: 5, method: adams")), 7, "integrator.method", "model; choose dopri5 or auto"),
+    (stone(("t_end: 5", "t_end: 5, method: adams")), 7, "integrator.method", "model; choose dopri5"),
     # What is nearly a value with a unit.
     (small("[0.02, 0.05]", "[0.02, 3 rpm]"), 4, "start.n0", "is in sqrt(g/c) here; give the number without rpm"),
     (small("1500", "20 s"), 5, "integrator.t_end", "is in sqrt(c/g) here; give the number without s"),

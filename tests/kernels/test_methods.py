@@ -36,7 +36,7 @@ MIXED: dict[str, dict[str, Any]] = {
 
 def mixed(kernel: Kernel) -> np.ndarray:
     """Cells that settle, reach the limit, lift off and diverge, at different steps."""
-    return started(kernel, t_end=900.0, settle=True, **MIXED[kernel.method])
+    return started(kernel, t_end=900.0, settle=True, **MIXED.get(kernel.method, MIXED["dopri5"]))
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,13 @@ from support import ROOT, Write
 
 import sweep
 from sweep.faults import FileError
+from sweep.kernels.measures import MEASURES
 from sweep.results import netcdf, provenance
 from sweep.results.dataset import STATUSES, VARIABLES
 from sweep.results.writing import replacing
 
-NOT_BY_DEFAULT = """method t_first_reversal_predicted reversal_times reversals_estimated estimate_certain n_c2_simulated
-n_c2_bracket n_c_reason"""
+OF_OTHERS = {"method", "t_first_reversal_predicted", "n_c2_simulated", "n_c2_bracket", "n_c_reason"}
+"""Variables of datasets of another kind, or made with other settings."""
 
 
 def test_dataset_is_labelled(small: xr.Dataset) -> None:
@@ -34,7 +35,8 @@ def test_dataset_is_labelled(small: xr.Dataset) -> None:
         assert "long_name" in variable.attrs, name
         assert variable.attrs.get("units") != "1", name  # or xarray's labels would end with "[1]"
     assert small["delta"].attrs["units"] == "radian"
-    assert set(small.data_vars) == {*VARIABLES} - {*NOT_BY_DEFAULT.split()}
+    asked = {name for kind in MEASURES.values() if not kind.by_default for name in kind.variables}
+    assert set(small.data_vars) == {*VARIABLES} - asked - OF_OTHERS
     assert {name: str(small[name].dtype) for name in ("reversals", "status", "spin_final", "reversals_predicted")} == {
         "reversals": "int16", "status": "int8", "spin_final": "float64", "reversals_predicted": "int16",
     }  # fmt: skip
