@@ -34,8 +34,9 @@ class Tableau:
     """Error constant: the phase of the fastest motion in a step at the default tolerance, in units of
     `Model.radians_a_step`.  The error falls with the power `order` of it."""
     layer_error: float
-    """Error constant of the start: the relative error of the slip, with steps of `LAYER_STEP` decay times, while it
-    goes from zero to the value that follows from the slow motion.  It falls with the same power."""
+    """Error constant of the start: the relative error of the slip while it goes from zero to the value that follows
+    from the slow motion, v' = λ (1 - v).  For short steps h it is |C| (h λ)^order / e, where the stability function is
+    R(-z) = exp(-z) + C z^(order + 1) + …; give that at h λ = `LAYER_STEP`, whether or not such a step is stable."""
 
     automatic: bool = False
     """Whether `method: auto` may choose it."""
@@ -46,7 +47,7 @@ class Tableau:
 
 
 LAYER_STEP = 3.0
-"""Steps, in decay times of the slip, at which `Tableau.layer_error` is measured."""
+"""Step, in decay times of the slip, to which `Tableau.layer_error` is scaled."""
 
 # Dormand & Prince (1980), J. Comput. Appl. Math. 6, 19, table 2: RK5(4)7M.  Its seventh stage
 # is left out: it serves only the embedded error estimate, which a fixed step does not use.

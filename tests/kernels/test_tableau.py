@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from fractions import Fraction
-from math import prod
+from math import e, factorial, prod
 
+import numpy as np
 import pytest
 
 from sweep.kernels.methods import METHODS
-from sweep.kernels.tableau import TABLEAUS, Tableau
+from sweep.kernels.tableau import LAYER_STEP, TABLEAUS, Tableau
 
 Tree = tuple["Tree", ...]
 """A rooted tree: the trees that its root carries, in order."""
@@ -61,6 +62,20 @@ def test_no_entry_is_mistyped(tableau: Tableau) -> None:
         assert sum((b * weight for b, weight in weights), Fraction(0)) == Fraction(1, _density(tree)), tree
     inside, outside = (abs(stability(tableau, -tableau.real_stability * s)) for s in (0.999, 1.001))
     assert inside < 1 < outside
+
+
+@pytest.mark.parametrize("tableau", TABLEAUS, ids=lambda tableau: tableau.name)
+def test_the_error_constant_of_the_start_is_that_of_a_slip_that_sets_in(tableau: Tableau) -> None:
+    """A message gives the number for a new method."""
+    tall: Tree = ()
+    for _ in range(tableau.order):
+        tall = (tall,)
+    power = sum(b * weight for b, weight in zip(tableau.b, _weights(tableau, tall), strict=True))
+    expected = abs(float(power) - 1 / factorial(tableau.order + 1)) * LAYER_STEP**tableau.order / e
+    assert tableau.layer_error == pytest.approx(expected, rel=0.5), f"layer_error={expected:.2g}"
+    step, times = 0.01, 0.01 * np.arange(400)
+    error = np.abs(stability(tableau, -step) ** np.arange(400) - np.exp(-times)).max()
+    assert expected * (step / LAYER_STEP) ** tableau.order == pytest.approx(error, rel=0.02)
 
 
 def test_the_codes_of_methods_are_those_of_old_datasets() -> None:

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import STANDARD, columns, newton, wide_bodies
 from support import cells as all_cells
+from support.newton import FRICTION
 from support.physics import KANE_LEVINSON
 
 from sweep.models import find, variants
@@ -28,7 +29,6 @@ from sweep.models.theory import linear, stability
 from sweep.models.theory.rocking import frequencies
 
 SKEW = KANE_LEVINSON | {"mass": 0.7, "Ixz": 3e-5, "Iyz": -1e-5}
-FRICTION = {"radius_contact": 0.004, "mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
 COUPLES = {"sigma": 1e-4, "mu_rolling": 0.1, "radius": 0.004, "speed_rolling": 0.5}
 COUPLES |= {"mu_spinning": 0.2, "radius_spinning": 0.003, "speed_spinning": 2.0}
 BOWL = SKEW | {"a": 0.012, "b": 0.35, "surface": "paraboloid"}
@@ -123,7 +123,7 @@ def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
     assert np.std(trend[1]) < 0.05 * np.std(trend[0])
 
 
-@pytest.mark.parametrize("law", [law for law in LAWS if law not in ("none", "contensou")])
+@pytest.mark.parametrize("law", [law.name for law in LAWS.values() if law.parameters and not law.coupled])
 def test_the_bound_on_a_laws_resistance_holds_and_is_near(law: str) -> None:
     p, x = FRICTION | KANE_LEVINSON, np.linspace(0, 0.3, 30001)
     force = np.array([newton.LAWS[law](each, p) for each in x])

@@ -32,6 +32,9 @@ LAWS: dict[str, Callable[[float, Mapping[str, float]], float]] = {
 }
 """Friction force per unit of normal force, at the slip velocity x >= 0: the package's laws."""
 
+FRICTION = {"radius_contact": 0.004, "mu": 0.4, "mu_static": 0.7, "mu_viscous": 0.3, "speed": 0.05, "speed_stick": 0.02}
+"""Values of the parameters of all laws."""
+
 OWN = {"fading": lambda x, p: p["mu"] * x / np.hypot(x, p["speed"]) / (1 + (x / p["fading"]) ** 2)}
 """The law of a user's model, in `support.own`."""
 
