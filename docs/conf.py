@@ -1,56 +1,32 @@
 """Sphinx: `python -m sphinx -j auto -W --keep-going -b html docs build/docs` (README, "Go on").
 
-Nothing here needs a network: MathJax lies in _static, and no inventory of another project is loaded.
+Pages are plain Markdown that can be read without it.  Building them runs nothing and needs no network: MathJax lies in
+_static.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib.metadata import version as installed
 from pathlib import Path
 
-HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
+from sphinx.application import Sphinx
+
+sys.path[:0] = [str(Path(__file__).parents[1])]
 
 project = "sweep"
 author = "The sweep developers"
 version = release = installed("rattleback-sweep")
 
-extensions = [
-    "myst_nb",
-    "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
-    "sphinx_click",
-    "sphinx_copybutton",
-    "console",
-    "docstrings",
-    "rooms",
-    "tables",
-    "thumbnails",
-]
-exclude_patterns = ["_ext", "_static"]
-# A public name stands twice: in `sweep` and in the module that defines it.  References may mean either.
-suppress_warnings = ["ref.python"]
+extensions = ["myst_parser", "sphinx.ext.mathjax", "sphinx_copybutton"]
+exclude_patterns = ["_static"]
 
-# Every reference must lead somewhere, but for types in signatures: those of other packages have no page here.
-nitpicky = True
-nitpick_ignore_regex = [("py:(class|data|obj|attr|exc)", ".*")]
-
-myst_enable_extensions = ["amsmath", "attrs_block", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
-nb_execution_mode = "force"
-nb_execution_raise_on_error = True
-nb_execution_timeout = 600
-nb_merge_streams = True
-nb_output_stderr = "remove"  # where progress is shown
 
-default_role = "code"
 smartquotes_action = "qe"  # quotes and ellipses, but no dashes: `--fresh` is an option
-add_module_names = False
-autodoc_member_order = "bysource"
-autodoc_mock_imports = ["bokeh"]  # of the extra `explore`
-autodoc_typehints = "signature"
-autodoc_preserve_defaults = True
 
 copybutton_prompt_text = "$ "
 
@@ -63,3 +39,14 @@ html_copy_source = False
 mathjax_path = "mathjax/tex-svg-full.js"
 # Accessibility and menus would load further files, which are not here.
 mathjax3_config = {"options": {"enableMenu": False}}
+
+
+def _add_contents(_app: Sphinx, name: str, source: list[str]) -> None:
+    """Make a menu of the pages that an index lists."""
+    if name.rpartition("/")[2] == "index":
+        pages = re.findall(r"^- .*?\[[^\]]+\]\(([\w/-]+)\.md\)", source[0], re.MULTILINE)
+        source[0] += "\n".join(["", "```{toctree}", ":hidden:", "", *pages, "```", ""])
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("source-read", _add_contents)

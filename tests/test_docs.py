@@ -1,51 +1,36 @@
 """What README and docs show works: commands, Python, configurations, links, paths and names; and what they say is so.
 
-Fenced blocks are run as they stand, page by page from top to bottom, in a folder with the configurations of
-`configs/` on coarser grids: ```console (lines that begin with `$ `), ```python and ```{code-cell}; every ```yaml
-must be a configuration; a ```{code-block} with a caption is a file.  A block that must not be run has a comment above
-it that says why: <!-- not run: takes minutes -->.  It takes minutes, and is a campaign.
-
-What a page shows as output is made when the pages are built, by ```{code-cell}, ```{console} and ```{python}.  A page
-that has nothing else is run then alone.
+Everyday tests read the pages.  A campaign runs the code of each page, as `docs/renew.py` does, and compares what it
+prints and draws with what stands there.
 """
 
+import ast
 import pkgutil
 import re
+import runpy
 import shlex
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from matplotlib.testing.compare import compare_images
-from ruamel.yaml import YAML
 from support import ROOT
 
 import sweep
 from sweep.cli import main
 
-PAGES = [ROOT / "README.md", ROOT / "docs" / "index.md", *sorted((ROOT / "docs").glob("[!_]*/*.md"))]
+RENEW = runpy.run_path(str(ROOT / "docs" / "renew.py"))
+PAGES: list[Path] = RENEW["PAGES"]
+
+_LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
+_PATH = re.compile(r"`(?P<path>(?:\.ci|configs|data|docs|scripts|sweep|tests)/[\w./*-]*)`")
+_NAME = re.compile(r"`(?P<name>sweep(?:\.[A-Za-z_]\w*)+)(?:\(\))?`")
 
 
 def _name(page: Path) -> str:
     return str(page.relative_to(ROOT).with_suffix(""))
-
-
-_FENCE = re.compile(
-    r"(?P<skipped><!-- not run: [^\n]+ -->\n+)?"
-    r"^(?P<indent> *)```(?P<kind>\S*)[^\n]*\n(?P<text>.*?)^(?P=indent)```$",
-    re.MULTILINE | re.DOTALL,
-)
-_LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
-_PATH = re.compile(r"`(?P<path>(?:\.ci|configs|data|docs|scripts|sweep|tests)/[\w./*-]*)`")
-_ROLE = re.compile(r"\{py:\w+\}`~?(?P<name>[\w.]+)`")
-_NAME = re.compile(r"`(?P<name>sweep(?:\.[A-Za-z_]\w*)+)(?:\(\))?`")
 
 
 @dataclass(frozen=True)
@@ -54,105 +39,93 @@ class Block:
     line: int
     kind: str
     text: str
-    skipped: bool
+    mark: str | None
 
     def __str__(self) -> str:
         return f"{self.page.relative_to(ROOT)}:{self.line}"
 
 
-def blocks(page: Path) -> Iterator[Block]:
-    text = page.read_text(encoding="utf-8")
-    for match in _FENCE.finditer(text):
-        indent = len(match["indent"])
-        lines = "".join(line[indent:] or "\n" for line in match["text"].splitlines(keepends=True))
-        line = text.count("\n", 0, match.start("kind")) + 1
-        yield Block(page, line, match["kind"], lines, bool(match["skipped"]))
+def blocks(*kinds: str) -> Iterator[Block]:
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for part in RENEW["PART"].finditer(text):
+            if part["kind"] in kinds:
+                yield Block(page, text.count("\n", 0, part.start("kind")) + 1, part["kind"], part["text"], part["mark"])
 
 
-def commands(block: Block) -> list[str]:
-    """Those of a block, which has no output: what is shown as output is made when the pages are built."""
-    assert all(line.startswith("$ ") for line in block.text.splitlines()), block
-    return [line[2:] for line in block.text.splitlines()]
+def commands() -> Iterator[tuple[str, list[str]]]:
+    """Every command of sweep that stands on a line of its own in a block, with its place."""
+    for block in blocks("console", "text", ""):
+        for line in block.text.splitlines():
+            words = shlex.split(line.removeprefix("$ "), comments=True) if "sweep " in line else []
+            if words[:3] == ["python", "-m", "sweep"] or (line.startswith("$ ") and words[:1] == ["sweep"]):
+                yield f"{block}: {line}", words[words.index("sweep") + 1 :]
 
 
-def _runs(page: Path) -> list[Block]:
-    """The blocks to run, none if building the pages runs all of them."""
-    kinds = ("console", "{console}", "python", "{python}", "{code-cell}", "yaml", "{code-block}")
-    found = [block for block in blocks(page) if block.kind in kinds and not block.skipped]
-    return found if {block.kind for block in found} & {"console", "python", "yaml"} else []
+def test_commands_have_the_options_that_pages_give_them() -> None:
+    found = list(commands())
+    assert len(found) > 50
+    for place, (name, *words) in found:
+        known = {option for parameter in main.commands[name].params for option in parameter.opts} | {"--help", "-h"}
+        assert not {word.partition("=")[0] for word in words if word.startswith("--")} - known, place
 
 
-def _coarsen(value: Any) -> Any:
-    """The same configuration with axes of three values."""
-    if isinstance(value, dict):
-        return {key: min(3, v) if key in ("num", "samples") else _coarsen(v) for key, v in value.items()}
-    return value
+def test_programs_are_python() -> None:
+    for block in blocks("python"):
+        ast.parse(block.text, str(block))
 
 
-@pytest.fixture
-def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder like the repository's, with small configurations: of coarse axes, without late times, and with the
-    measurements that other tests have kernels for."""
-    yaml = YAML(typ="safe", pure=True)
-    (tmp_path / "configs").mkdir()
-    for path in (ROOT / "configs").glob("*.yaml"):
-        small = _coarsen(yaml.load(path))
-        small["integrator"] = {**small.get("integrator", {}), "t_end": 10 if small.get("units") == "SI" else 300}
-        if small.get("model") == "noslip" and small.get("units") == "SI":
-            small["measure"] = ["reversals", {"reversal_times": 1}, "energy_error"]
-        else:
-            small.pop("measure", None)
-        yaml.dump(small, tmp_path / "configs" / path.name)
-    for path in (ROOT / "configs").iterdir():
-        if path.suffix in (".py", ".csv"):
-            shutil.copy(path, tmp_path / "configs")
-    (tmp_path / "docs" / "tutorial").mkdir(parents=True)
+def test_configurations_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sweep.plots.animation.FRAMES_A_SECOND", 3)
-    monkeypatch.setattr(mpl, "rcParams", mpl.RcParams(mpl.rcParams | {"figure.max_open_warning": 0}))
-    mpl.use("Agg")
-    yield tmp_path
-    plt.close("all")  # or the next page draws on
+    files = {}
+    for page in PAGES:
+        for part in RENEW["PART"].finditer(page.read_text(encoding="utf-8")):
+            if part["mark"] == "file":
+                files[part["about"]] = part["text"]
+    for name, text in files.items():
+        Path(name).write_text(text, encoding="utf-8")
+    for block in blocks("yaml"):
+        text = block.text if "friction" in block.text else f"{block.text}friction: {{mu: 60}}\n"
+        known = re.search(r"^(model: .*\.py|cases: .*\.csv)$", text, re.MULTILINE)
+        sweep.load_config(_written(block.text if known else text, tmp_path, block))
 
 
-def _run_command(block: Block, command: str) -> None:
-    words = shlex.split(command, comments=True)
-    assert words[:3] == ["python", "-m", "sweep"], f"{block}: {command}: only sweep's own commands are run"
-    words, target = (words[:-2], words[-1]) if words[-2] == ">" else (words, "")
-    result = CliRunner().invoke(main, words[3:])
-    assert result.exit_code == 0, f"{block}: {command}\n{result.output}"
-    if target:
-        Path(target).write_text(result.stdout, encoding="utf-8")
-
-
-def _check_configuration(block: Block, folder: Path) -> None:
-    text = block.text if "friction" in block.text else f"{block.text}friction: {{mu: 60}}\n"
+def _written(text: str, folder: Path, block: Block) -> Path:
     path = folder / f"line{block.line}.yaml"
     path.write_text(text, encoding="utf-8")
-    sweep.load_config(path)
+    return path
+
+
+_LOOKED_AT = {"explore"}
+"""Pages whose pictures are looked at by a person: a browser draws them, with trajectories that run meanwhile."""
+
+_VARYING = re.compile(r"\d[\d.]*( to \d[\d.]*)? (s|min|ms|h|MiB|MB)\b|20\d\d-\d\d-\d\d\S*|\b0\.\d[\w.+]*\.dev\S*")
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("page", [page for page in PAGES if _runs(page)], ids=_name)
-def test_what_a_page_shows_runs(page: Path, checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names: dict[str, Any] = {}
-    found = _runs(page)
-    if found[0].kind == "{code-cell}":  # Sphinx runs a notebook in its own folder
-        folder = checkout / page.relative_to(ROOT).parent
-        folder.mkdir(parents=True, exist_ok=True)
-        monkeypatch.chdir(folder)
-    for block in found:
-        if block.kind in ("console", "{console}"):
-            for command in commands(block):
-                _run_command(block, command)
-        elif block.kind == "yaml":
-            _check_configuration(block, checkout)
-        elif block.kind == "{code-block}":
-            head, _, text = block.text.partition("\n\n")
-            (checkout / head.removeprefix(":caption: ")).write_text(text, encoding="utf-8")
-        else:
-            code = re.sub(r"\A(:\w.*\n)+", "", block.text)
-            exec(compile(code, str(block), "exec"), names)
+@pytest.mark.parametrize("page", [page for page in PAGES if page.stem not in _LOOKED_AT], ids=_name)
+def test_what_a_page_shows_is_what_its_code_gives(page: Path, tmp_path: Path) -> None:
+    """To renew it: `python docs/renew.py PAGE`."""
+    text = RENEW["renewed"](page, tmp_path)
+    shown, found = (_VARYING.sub("#", each) for each in (page.read_text(encoding="utf-8"), text))
+    assert shown == found
+    for drawn in tmp_path.iterdir():
+        stored = ROOT / "docs" / "_static" / drawn.name
+        # Letters may be rendered a little differently.
+        assert drawn.suffix != ".png" or compare_images(str(stored), str(drawn), tol=10) is None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_tables_are_those_of_the_program(page: Path) -> None:
+    """To renew them: `python docs/renew.py PAGE`."""
+    text = page.read_text(encoding="utf-8")
+    assert text == RENEW["with_tables"](text)
+
+
+def test_a_planted_difference_in_a_table_is_found() -> None:
+    text = (ROOT / "docs/reference/dataset.md").read_text(encoding="utf-8")
+    planted = text.replace("| `settled` |", "| `at rest` |")
+    assert planted != text == RENEW["with_tables"](planted)
 
 
 _DRAWS = re.compile(r"python -m sweep (run|plot|trajectory|animate|critical|boundaries|fit|explore)\b(?!.*--dry)")
@@ -163,20 +136,39 @@ _OF_OTHER_THINGS = {"cluster", "develop", "reproduce", "resume"}
 @pytest.mark.parametrize("page", sorted((ROOT / "docs" / "how-to").glob("*.md")), ids=_name)
 def test_how_to_pages_that_draw_show_a_figure_soon(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    figure = re.search(r"^```\{(picture|image|python)\}", text, re.MULTILINE)
+    figure = re.search(r"^!\[", text, re.MULTILINE)
     draws = bool(_DRAWS.search(text)) and page.stem not in _OF_OTHER_THINGS
     assert bool(figure) >= draws
     assert not figure or text.count("\n## ", 0, figure.start()) <= 1
 
 
+def test_every_stored_picture_stands_on_a_page() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    stored = [path for path in (ROOT / "docs" / "_static").iterdir() if path.suffix in (".png", ".gif", ".svg")]
+    assert not [path.name for path in stored if f"_static/{path.name})" not in text]
+
+
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "data" / "README.md", ROOT / "scripts" / "LOG.md"], ids=_name)
 def test_links_paths_and_names_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    targets = [m["target"].split("#")[0] for m in _LINK.finditer(text) if "://" not in m["target"]]
-    lost = [target for target in targets if target and not (page.parent / target).exists()]
+    targets = [m["target"] for m in _LINK.finditer(text) if "://" not in m["target"]]
+    lost = [target for target in targets if not _leads_somewhere(page, target)]
     lost += [m["path"] for m in _PATH.finditer(text) if not list(ROOT.glob(m["path"].rstrip("/")))]
-    lost += [m["name"] for pattern in (_ROLE, _NAME) for m in pattern.finditer(text) if not _exists(m["name"])]
+    lost += [m["name"] for m in _NAME.finditer(text) if not _exists(m["name"])]
     assert not lost
+
+
+def _leads_somewhere(page: Path, target: str) -> bool:
+    """Whether a file exists, and has the heading that the link names."""
+    name, _, heading = target.partition("#")
+    path = page.parent / name if name else page
+    return path.exists() and (not heading or heading in _anchors(path))
+
+
+def _anchors(page: Path) -> set[str]:
+    """The anchors of the headings of a page, as GitHub and Sphinx write them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def _exists(name: str) -> bool:
@@ -186,6 +178,14 @@ def _exists(name: str) -> bool:
     except (ImportError, AttributeError):
         return False
     return True
+
+
+_SPHINX = re.compile(r"^ *(```|:::)\{|\{(doc|ref|term|py:\w+)\}`|^\([\w-]+\)=$|^---\nfile_format", re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_pages_can_be_read_without_sphinx(page: Path) -> None:
+    assert not _SPHINX.search(page.read_text(encoding="utf-8"))
 
 
 def test_pages_that_the_code_cites_exist() -> None:
@@ -232,11 +232,3 @@ def test_the_finding_says_how_far_the_formula_is_off() -> None:
     line = sweep.predict(ROOT / "configs" / "mu.yaml")
     ratios = (line.n_c1_linear / line.n_c1).values
     assert [int(number) for number in said.groups()] == [round(100 * (1 - 1 / r)) for r in (ratios.min(), ratios.max())]
-
-
-@pytest.mark.campaign
-def test_the_picture_of_the_readme_is_what_the_program_draws(tmp_path: Path) -> None:
-    """To renew it: `python scripts/pictures.py`."""
-    sweep.plot(sweep.run(ROOT / "configs" / "mu_b.yaml", n0=0.05), output=tmp_path / "map.png")
-    # Letters may be rendered a little differently.
-    assert compare_images(str(ROOT / "docs" / "_static" / "map.png"), str(tmp_path / "map.png"), tol=10) is None

@@ -26,7 +26,7 @@ TYPESET = "window.MathJax?.startup?.promise.then(() => null, String)"
 
 # How far text reaches to the right, but for formulas, tables and pictures that scroll by themselves.
 WIDTH = """Math.max(...[...document.querySelectorAll('article :is(h1, p, li, dd, dt, pre, table)')]
-    .filter(each => !each.closest('.table-wrapper, .cell_output, .math'))
+    .filter(each => !each.closest('.table-wrapper, .math'))
     .map(each => each.getBoundingClientRect().right))"""
 
 

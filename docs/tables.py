@@ -1,19 +1,17 @@
-"""Tables of the reference, made from the sources that the program itself reads.
-
-Each directive is named after its table and takes no arguments: see `setup`.
-"""
+"""Tables and lists of the reference, made from the sources that the program itself reads: see `MADE`."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
-from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.util.docutils import SphinxDirective
+from click.testing import CliRunner
 
 import sweep
+from sweep.cli import main
 from sweep.config import messages, schema
 from sweep.kernels import measures, methods
 from sweep.kernels.status import COUNT_DOUBTS, FAILURES
@@ -142,36 +140,63 @@ def _models() -> tuple[Row, list[Row]]:
 def _functions() -> tuple[Row, list[Row]]:
     """Functions first, in the order of their names, then classes."""
     public = sorted((inspect.isclass(getattr(sweep, name)), name) for name in sweep.__all__)
-    rows = []
-    for is_class, name in public:
-        summary = inspect.getdoc(getattr(sweep, name)).partition("\n")[0]
-        rows.append((f"{{py:{'class' if is_class else 'func'}}}`~sweep.{name}`", summary))
+    rows = [(f"`sweep.{name}`", inspect.getdoc(getattr(sweep, name)).partition("\n")[0]) for _, name in public]
     return ("name", "purpose"), rows
 
 
-def _directive(make: Callable[[], tuple[Row, list[Row]]]) -> type[SphinxDirective]:
-    class Table(SphinxDirective):
-        def run(self) -> list[nodes.Node]:
-            head, rows = make()
-            lines = ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in (head, *rows)]
-            lines.insert(1, "|" + "---|" * len(head))
-            return self.parse_text_to_nodes("\n".join(lines))
-
-    return Table
+def _table(rows: tuple[Row, list[Row]]) -> str:
+    head, body = rows
+    lines = ["| " + " | ".join(cell.replace("|", r"\|") for cell in row) + " |" for row in (head, *body)]
+    lines.insert(1, "|" + "---|" * len(head))
+    return "\n".join(lines)
 
 
-def setup(app: Sphinx) -> dict[str, bool]:
-    for name, make in (
-        ("parameters", _parameters),
-        ("units", _units),
-        ("settings", _settings),
-        ("variables", _variables),
-        ("statuses", _statuses),
-        ("doubts", _doubts),
-        ("measurements", _measurements),
-        ("methods", _methods),
-        ("models", _models),
-        ("functions", _functions),
-    ):
-        app.add_directive(name, _directive(make))
-    return {"parallel_read_safe": True}
+_ENTRY = re.compile(r"([*\w]+(?:, [*\w]+)*) : (.*)")
+_ERRORS = re.compile(r"\w+Error(, \w+Error)*$")
+
+
+def _markdown(docstring: str) -> Iterator[str]:
+    """Yield the lines of a docstring without its examples, with sections in bold and parameters as a list."""
+    text = docstring.partition("\nExamples\n---")[0].replace("``", "`").replace(".  ", ". ")
+    lines = text.splitlines()
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        if below and set(below) == {"-"}:
+            yield f"**{line}**\n"
+        elif entry := _ENTRY.match(line):
+            yield f"- `{entry[1]}`: {entry[2]}"
+        elif _ERRORS.match(line):
+            yield f"- {line}:"
+        elif not line or set(line) != {"-"}:
+            yield re.sub(r"^    ", "  ", line)
+
+
+def _python() -> str:
+    """Each function with its parameters, without their types, which its description contains."""
+    parts = []
+    for name in (name for name in sweep.__all__ if inspect.isfunction(getattr(sweep, name))):
+        signature = inspect.signature(getattr(sweep, name))
+        bare = [each.replace(annotation=each.empty) for each in signature.parameters.values()]
+        call = f"sweep.{name}{signature.replace(parameters=bare, return_annotation=signature.empty)}"
+        call = re.sub(r"=<.*?>(?=[,)])", "=…", call)
+        parts += [f"### `{name}`\n", f"```text\n{call}\n```\n", *_markdown(inspect.getdoc(getattr(sweep, name))), ""]
+    return "\n".join(parts)
+
+
+def _commands() -> str:
+    parts = []
+    for name in main.commands:
+        text = CliRunner().invoke(main, [name, "--help"], prog_name="sweep").stdout
+        parts.append(f"## `{name}`\n\n```text\n{text}```\n")
+    return "\n".join(parts)
+
+
+_TABLES = (
+    _parameters, _units, _settings, _variables, _statuses, _doubts, _measurements, _methods, _models, _functions,
+)  # fmt: skip
+
+MADE: dict[str, Callable[[], str]] = {
+    **{table.__name__[1:]: partial(lambda table: _table(table()), table) for table in _TABLES},
+    "python": _python,
+    "commands": _commands,
+}
+"""What makes each part of a page, by the name in its comment."""
