@@ -1,4 +1,4 @@
-"""Sphinx: `python -m sphinx -j auto -W --keep-going -b html docs build/docs` (README, "Go on").
+"""Sphinx: `python -m sphinx -j auto -W --keep-going -b html docs build/docs` (docs/how-to/develop.md).
 
 Pages are plain Markdown that can be read without it.  Building them runs nothing and needs no network: MathJax lies in
 _static.
