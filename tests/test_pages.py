@@ -32,7 +32,7 @@ WIDTH = """Math.max(...[...document.querySelectorAll('article :is(h1, p, li, dd,
 
 @pytest.fixture(scope="module")
 def pages() -> list[Path]:
-    """Every page, built by the command of docs/how-to/develop.md; what has not changed since the last build is not made again."""
+    """Every page, built by the command of docs/how-to/develop.md."""
     python(*shlex.split("-m sphinx -j auto -W --keep-going -q -b html docs build/docs"))
     return sorted(BUILD.rglob("*.html"))
 
