@@ -43,6 +43,9 @@ STATIC = ROOT / "docs" / "_static"
 PAGES = [ROOT / "README.md", ROOT / "docs" / "index.md", ROOT / "docs" / "gallery.md"]
 PAGES += sorted((ROOT / "docs").glob("[!_]*/*.md"))
 
+SETTINGS = "figure.figsize: 9.0, 4.5\n"
+"""Of matplotlib: pictures are as wide as a page, so that their text can be read there."""
+
 COLOURS = 128
 """Of a stored picture, which makes it a third as large."""
 
@@ -61,10 +64,12 @@ def with_tables(text: str) -> str:
 
 def renewed(page: Path, pictures: Path) -> str:
     """Return the text of a page as it is today, and write its pictures into the folder `pictures`."""
-    mpl.use("agg")
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), mpl.rc_context():
         for name in ("configs", "data"):
             shutil.copytree(ROOT / name, name, ignore=shutil.ignore_patterns("benchmark", "reference*"))
+        Path("matplotlibrc").write_text(SETTINGS, encoding="utf-8")  # which commands read too
+        mpl.rc_file("matplotlibrc")
+        mpl.use("agg")
         text = "".join(_parts(with_tables(page.read_text(encoding="utf-8")), pictures))
     plt.close("all")
     return text
