@@ -63,7 +63,7 @@ def keep_busy(
 
 
 def _advance(lives: Lives, which: Array, blocks: int) -> int:
-    """Advance the cells `which` by a number of blocks in every lane; return how many blocks the next chunk should have."""
+    """Advance the cells `which` by `blocks` in every lane; return how many blocks the next chunk should have."""
     kernel, rows = lives.cells.kernel, lives.cells.rows
     table, began = kernel.table(rows), time.perf_counter()
     left = table["goal"][which] - table["done"][which]
