@@ -46,9 +46,6 @@ PAGES += sorted((ROOT / "docs").glob("[!_]*/*.md"))
 SETTINGS = "figure.figsize: 9.0, 4.5\n"
 """Of matplotlib: pictures are as wide as a page, so that their text can be read there."""
 
-COLOURS = 128
-"""Of a stored picture, which makes it a third as large."""
-
 PART = re.compile(
     r"(?:^ *<!-- (?P<mark>not run|file|picture): (?P<about>[^\n]+?) -->\n+)?"
     r"(?:^(?P<indent> *)```(?P<kind>\w*)\n(?P<text>.*?)^(?P=indent)```$|^!\[[^\]]*\]\((?P<image>\S+)\)$)",
@@ -133,7 +130,8 @@ def _draw(source: str, target: Path) -> None:
     else:
         shutil.copy(source, target)
     if target.suffix == ".png":
-        Image.open(target).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+        few = Image.open(target).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        few.save(target, optimize=True)  # a third as large
 
 
 def _photograph(target: Path) -> None:
