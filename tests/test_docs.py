@@ -99,7 +99,10 @@ def _written(text: str, folder: Path, block: Block) -> Path:
 _LOOKED_AT = {"explore"}
 """Pages whose pictures are looked at by a person: a browser draws them, with trajectories that run meanwhile."""
 
-_VARYING = re.compile(r"\d[\d.]*( to \d[\d.]*)? (s|min|ms|h|MiB|MB)\b|20\d\d-\d\d-\d\d\S*|\b0\.\d[\w.+]*\.dev\S*")
+_VARYING = re.compile(
+    r"\d[\d.]*( to \d[\d.]*)? (s|min|ms|h|MiB|MB)\b|\d[\d.]*e[-+]?\d+|20\d\d-\d\d-\d\d\S*|\b\S+\.dev\S*"
+)
+"""What differs between machines and days: times, sizes, errors and versions."""
 
 
 @pytest.mark.campaign
