@@ -100,7 +100,7 @@ _LOOKED_AT = {"explore"}
 """Pages whose pictures are looked at by a person: a browser draws them, with trajectories that run meanwhile."""
 
 _VARYING = re.compile(
-    r"\d[\d.]*( to \d[\d.]*)? (s|min|ms|h|MiB|MB)\b|\d[\d.]*e[-+]?\d+|20\d\d-\d\d-\d\d\S*|\b\S+\.dev\S*"
+    r"\d[\d.]*( to \d[\d.]*)? (s|min|ms|h|MiB|MB|trajectories/s)\b|\d[\d.]*e[-+]?\d+|\d+\.\d+\.\d+|20\d\d-\d\d-\d\d\S*"
 )
 """What differs between machines and days: times, sizes, errors and versions."""
 
