@@ -12,7 +12,7 @@ from support import ROOT
 from support.processes import python
 
 _PAGE = (ROOT / "docs" / "how-to" / "add-scene.md").read_text(encoding="utf-8")
-_CHANGES = re.findall(r"```\{code-block\} diff\n:caption: (\S+)\n\n(.*?)```", _PAGE, re.DOTALL)
+_CHANGES = re.findall(r"In `(\S+)`:\n\n```diff\n(.*?)```", _PAGE, re.DOTALL)
 LEVEL = ("slip", "noslip", "slip+viscous+offset+skew+gravity+sigma", "noslip+solid+gravity+rolling", "slip+contensou")
 
 
