@@ -32,6 +32,6 @@ def test_examples_in_docstrings_hold(name: str, tmp_path: Path, monkeypatch: pyt
     doctest.DebugRunner(verbose=False).run(test)
 
 
-def test_the_version_is_the_one_that_datasets_tell() -> None:
+def test_the_version_is_the_one_that_datasets_record() -> None:
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert sweep.__version__ == project["version"]
