@@ -25,7 +25,7 @@ from typing import Any
 
 import heyoka
 import numpy as np
-from reference_spins import Case, Extended, Rhs, first_times, problem, radau_path
+from reference_spins import STANDARD, Case, Extended, Rhs, first_times, problem, radau_path
 from reversals import Means, window_and_ripple
 
 from sweep.models import find
@@ -38,7 +38,6 @@ import example_scipy as example  # noqa: E402  # from a folder of data
 SHORT, LONG, STIFF, SECONDS = (50, 100, 200, 400), (100, 400, 1000, 2000, 3000), (25, 50), (1, 2, 3, 5, 8, 12)
 
 BODIES = (2.0, 3.0, 4.0, 6.0, 8.0)
-STANDARD = {"a": 10.0, "b": 3.0, "c": 1.0, "delta": 0.03, "n0": 0.05, "x0": 0.01, "y0": 0.01}
 KANE_LEVINSON = {
     "a": 0.2, "b": 0.03, "c": 0.02, "gravity": 9.81, "offset": 0.01, "mass": 1.0,
     "Ixx": 2.0e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3, "Ixy": -2.0e-5, "roll": 0.5 * np.pi / 180, "pitch": 0.5 * np.pi / 180,

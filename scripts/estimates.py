@@ -76,9 +76,8 @@ def main(which: str, cells: int = 500, seed: int = 1) -> None:
     found = sweep.run(config, measure=MEASURE)
     n0 = np.abs(xr.broadcast(found["n0"], found["reversals"])[0].transpose(*found["reversals"].dims).values)
     say("all", found, n0 > 0)
-    for low, high in (
-        ((0.02, 0.02), (0.05, 0.05), (0.1, 0.1)) if which == "mu_b" else ((0, 0.02), (0.02, 0.06), (0.06, 1))
-    ):
+    wider = (0, 0.02), (0.02, 0.06), (0.06, 1)
+    for low, high in ((0.02, 0.02), (0.05, 0.05), (0.1, 0.1)) if which == "mu_b" else wider:
         say(f"n0 = {low:g}" if low == high else f"n0 {low:g} to {high:g}", found, (low <= n0) & (n0 <= high))
 
 

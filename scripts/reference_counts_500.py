@@ -179,14 +179,11 @@ def leap(run: Run, states: Array, constants: Array) -> None:
 
 def jacobian(constants: Array, spin: Any) -> Array:
     """Jacobian of the rattle at upright spin, in 80-bit arithmetic by complex steps, shape (6, 6)."""
-    step, columns = np.longdouble(1e-30), []
+    step, columns, p = np.longdouble(1e-30), [], slip.MODEL.constants(*constants.astype(np.longdouble))
     for i in RATTLE:
         states = np.array(slip.MODEL.upright(spin)).astype(np.clongdouble)
         states[i] += 1j * step
-        columns.append(
-            np.array(slip.MODEL.rhs(states, slip.MODEL.constants(*constants.astype(np.longdouble)))[0])[RATTLE].imag
-            / step
-        )
+        columns.append(np.array(slip.MODEL.rhs(states, p)[0])[RATTLE].imag / step)
     return np.array(columns).T
 
 

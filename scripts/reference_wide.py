@@ -60,15 +60,10 @@ def draw(seed: int) -> list[Case]:
             continue
         b = log_uniform(1.01 * c, a)
         cell = {
-            "a": a,
-            "b": b,
-            "c": c,
-            "delta": random.uniform(-0.5, 0.5),
-            "mu": log_uniform(0.1, 5000),
+            "a": a, "b": b, "c": c, "delta": random.uniform(-0.5, 0.5), "mu": log_uniform(0.1, 5000),
             "n0": float(random.choice([-1, 1])) * log_uniform(0.005, 0.2),
-            "x0": random.uniform(-a / 10, a / 10),
-            "y0": random.uniform(-b / 10, b / 10),
-        }
+            "x0": random.uniform(-a / 10, a / 10), "y0": random.uniform(-b / 10, b / 10),
+        }  # fmt: skip
         cell = {name: float(f"{value:.6g}") for name, value in cell.items()}
         if height_squared(cell) > 0:
             cells.append(cell)
