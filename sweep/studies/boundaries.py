@@ -255,10 +255,6 @@ class Along(Boundaries):
         """Narrow all brackets, and those with uncertain cells from outside."""
         self.tolerance = self.sharp(self.width)
         yield from iter(self._wanted, [])
-        for _ in range(CLOSER):
-            yield [(curve, point, place) for curve in self.curves for point in curve.points
-                   for place in point.root.closer()]  # fmt: skip
-            yield from iter(self._wanted, [])
 
     def _counts(self, found: Mapping[str, Array]) -> Counts:
         certain = found["certain"] == 1 if "certain" in found else found["status"] == SETTLED
@@ -276,6 +272,7 @@ class Along(Boundaries):
                 cells = {places[i]: Cell(float(distance[i]), int(found.reversals[i]), True, measured[i]) for i in two}
                 point = Point.between(self.along, others, cells, ends, self.deviation)
                 point.narrow(self.width)
+                point.root.closer = CLOSER
                 yield Curve(level, False, (self.along,), [point])
 
 

@@ -94,8 +94,6 @@ class Spin:
     """The bracket, once the outward search has found one."""
     checked: dict[float, bool] = field(default_factory=dict)
     """Places simulated with estimated errors, and whether they count as the bracket says, with certainty."""
-    closer: int = CLOSER
-    """Times that the bracket may still be narrowed from outside."""
     reason: int | None = None
     """The result; None while the search goes on."""
 
@@ -103,9 +101,6 @@ class Spin:
         """Return the places to simulate next."""
         if not self.root:
             return self.left[:_OUTWARDS]
-        if self.root.unknown and self.closer:
-            self.closer -= 1
-            return self.root.closer()
         return self._unchecked() if self.root.ended else self.root.wanted()
 
     def learn(self, answers: list[Answer]) -> None:
@@ -127,9 +122,7 @@ class Spin:
             return Reason.FAILED
         if any(np.isnan(each.distance) for each in answers):
             return Reason.NOT_SETTLED
-        if root.unknown and self.closer:
-            return None
-        if not (root.unknown or root.ended) or self._unchecked():
+        if not root.ended or self._unchecked():
             return None
         return Reason.EXISTS if self.checked[root.low] and self.checked[root.high] else Reason.NOT_SETTLED
 
@@ -158,7 +151,7 @@ class Spin:
             return Reason.NOT_SETTLED
         values = {each.place: each.distance for each in (low, high)}
         smooth = {each.place: each.distance for each in self.passed if each.measured}
-        self.root = Root(low.place, high.place, -np.log1p(-self.width), values, smooth)
+        self.root = Root(low.place, high.place, -np.log1p(-self.width), values, smooth, closer=CLOSER)
         return None
 
 

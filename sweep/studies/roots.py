@@ -47,6 +47,8 @@ class Root:
     """Known values on the smooth branch that passes through the root."""
     roughly: bool = False
     """Whether the search may end once the values locate the root within the width, without a bracket that narrow."""
+    closer: int = 0
+    """Times that a bracket with a place without a value may still be narrowed from outside."""
     blank: list[float] = field(default_factory=list)
     """Places where the function has no value."""
     _pair: list[float] = field(default_factory=list)
@@ -58,12 +60,14 @@ class Root:
 
     @property
     def ended(self) -> bool:
+        if self.unknown:
+            return not self.closer
         rounding = 4 * float(np.spacing(max(abs(self.low), abs(self.high))))
-        return self.unknown or self.high - self.low <= max(self.width, rounding) or self._known
+        return self.high - self.low <= max(self.width, rounding) or self._known
 
     @property
     def unknown(self) -> bool:
-        """Return whether the function has no value somewhere in the bracket, which ends the search."""
+        """Return whether the function has no value somewhere in the bracket."""
         return any(self.low < place < self.high for place in self.blank)
 
     @property
@@ -72,7 +76,11 @@ class Root:
         return min(max(self._proposed()[0], self.low), self.high)
 
     def wanted(self) -> list[float]:
-        """Return the places to evaluate next."""
+        """Return the places to evaluate next; if one has no value, those halfway between each end and the nearest."""
+        if self.unknown:
+            self.closer -= 1
+            blank = [place for place in self.blank if self.low < place < self.high]
+            return [(self.low + min(blank)) / 2, (max(blank) + self.high) / 2]
         inside = not self._pair or (self._pair[0] <= self.low and self.high <= self._pair[-1])
         self._missed = 0 if inside else self._missed + 1
         root, off = self._proposed()
@@ -103,11 +111,6 @@ class Root:
             self.low = place
         else:
             self.high = place
-
-    def closer(self) -> list[float]:
-        """Return the places halfway between each end and the nearest place without a value; none if all have one."""
-        blank = [place for place in self.blank if self.low < place < self.high]
-        return [(self.low + min(blank)) / 2, (max(blank) + self.high) / 2] if blank else []
 
     @property
     def _known(self) -> bool:
