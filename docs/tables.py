@@ -75,7 +75,7 @@ def _variables() -> tuple[Row, list[Row]]:
     rows = []
     for over, table in tables.items():
         for name, spec in table.items():
-            meaning = spec.description or spec.long_name
+            meaning = "see below" if spec.masks else spec.description or spec.long_name
             if spec.flags and not spec.masks:
                 meaning += f" ({', '.join(f'{code} {flag}' for code, flag in spec.flags.items())})"
             rows.append((f"`{name}`", spec.dtype, over, _unit(spec), meaning))
