@@ -401,14 +401,18 @@ def test_a_drag_is_sought_where_the_configuration_names_none(write: Write) -> No
 
 
 @pytest.mark.usefixtures("by_formula")
-def test_a_start_is_given_on_the_side_of_the_configuration(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_start_is_given_on_the_side_of_the_configuration(
+    write: Write, monkeypatch: pytest.MonkeyPatch, turned: bool
+) -> None:
     """Half a turn takes the body to itself; a profile may end at the opposite of the minimum that it began from."""
 
     def opposite(*args: Any) -> Any:
         best, limits, rugged = intervals(*args)
         return best._replace(place=1 - best.place, jacobian=-best.jacobian), 1 - limits[:, ::-1], rugged
 
-    monkeypatch.setattr("sweep.studies.fit.intervals", opposite)
+    if turned:
+        monkeypatch.setattr("sweep.studies.fit.intervals", opposite)
     found = sweep.fit(write(SCENE), Film(TIMES, FORMULA), ["x0", "y0"], **TRUTH)
     assert (found.value > 0).all()
     assert ((found.lower_95 < found.value) & (found.value < found.upper_95)).all()
