@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -15,7 +13,6 @@ import click
 
 from sweep.faults import CompileError, Error, Fault, InputError, fault_of, printable
 from sweep.interrupt import INTERRUPTED
-from sweep.parameters import Parameter
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
 CLOSED_PIPE = 141
@@ -32,25 +29,10 @@ def refuse(option: str | Path, message: str) -> NoReturn:
     raise fault_of(message, file=str(option))
 
 
-@contextmanager
-def of_option(option: str, known: Mapping[str, Parameter]) -> Iterator[None]:
-    """Prefix `option` to faults of parameters that were given by that option."""
-    options = {"": option, **{name: f"{option} {name}" for name in known}}
-    try:
-        yield
-    except InputError as error:
-        raise _renamed(error, options) from None
-
-
 def _in_options(error: InputError, command: click.Command) -> InputError:
-    """Name the option in faults of an argument that was given on the command line."""
-    options = {name: each.opts[0] for each in command.params if isinstance(each, click.Option)
-               for name in (each.name, each.opts[0].lstrip("-"))}  # fmt: skip
-    return _renamed(error, options)
-
-
-def _renamed(error: InputError, options: Mapping[Any, str]) -> InputError:
-    """Put the option in the place of the first key of a fault's path, unless the fault lies in a file."""
+    """Put the option in the place of an argument that begins a fault's path, unless the fault lies in a file."""
+    options: dict[Any, str] = {name: each.opts[0] for each in command.params if isinstance(each, click.Option)
+                               for name in (each.name, each.opts[0].lstrip("-"))}  # fmt: skip
 
     def named(fault: Fault) -> Fault:
         first, *rest = fault.path or ("",)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sweep.cli.faults import TOO_MANY_FAILED, of_option, refuse, say
+from sweep.cli.faults import TOO_MANY_FAILED, refuse, say
 from sweep.cli.options import AT, OUTPUT, PATH, QUIET, SETTINGS, configured, loaded
 from sweep.interrupt import INTERRUPTED
 from sweep.studies import BOUNDARY_DEVIATION, BOUNDARY_WIDTH, DEVIATIONS, SPIN_WIDTH, WIDTHS
@@ -213,7 +213,7 @@ def fit(
 
     names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
     files = _files(config, "laws" if laws else "fit", output)
-    with Terminal(quiet) as terminal, of_option("--free", config.table):
+    with Terminal(quiet) as terminal:
         result = fitted(config, film, names, others, terminal, (time_column, spin_column))
     _save(result, files)
     with replacing(files.configuration) as temporary:

@@ -74,11 +74,11 @@ _RUGGED = "the misfit is rugged: minima lie close together, and the intervals be
 def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared: bool = False) -> xr.Dataset:
     """Fit the law of friction that `config` names, which may be one of several that are `compared`."""
     if not np.isfinite([film.time, film.value, film.errors]).all():
-        raise fault_of("the film holds a value that is not a number; leave out that instant")
+        raise fault_of("holds a value that is not a number; leave out that instant", "film")
     theirs, known = ranges.of_film(film), config.distributions
     config = _one_body(config, free, theirs)
     if reason := unlike(config, film):
-        raise fault_of(f"the film {reason}")
+        raise fault_of(reason, "film")
     began = time.perf_counter()
     if film.omitted:
         note(film.omitted)
@@ -90,7 +90,7 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared
         for name in dict.fromkeys([*free, *known])
     }  # fmt: skip
     if len(sought) >= len(film.time):
-        raise fault_of(f"{len(sought)} parameters are free, and the film has {len(film.time)} rows; free fewer")
+        raise fault_of(f"{len(sought)} parameters, and the film has {len(film.time)} rows; free fewer", "free")
     ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):
         raise config.error("x0", f"the range of a free parameter is too wide: {off}")
@@ -113,10 +113,10 @@ def _check_length(problem: Problem) -> None:
     usual = float(np.median(film.time[-1] / problem.steps(places)))
     if usual > _MOST_STEPS:
         raise fault_of(
-            f"a trajectory over the film takes {float(f'{usual:.1g}'):,.0f} steps, and a fit needs thousands of "
+            f"a trajectory over it takes {float(f'{usual:.1g}'):,.0f} steps, and a fit needs thousands of "
             f"trajectories; check the units of the film, which shows up to {np.abs(film.value).max():.3g} and lasts "
-            f"{film.time[-1]:.3g}, and those of the body"
-        )
+            f"{film.time[-1]:.3g}, and those of the body", "film",
+        )  # fmt: skip
 
 
 def with_optional(config: Config, free: Sequence[str]) -> Config:
@@ -140,11 +140,11 @@ def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> 
     config = config.at_medians
     known = (*config.tier.parameters, *of_film)
     if not free:
-        raise fault_of(f"name at least one free parameter, out of {', '.join(known)}")
+        raise fault_of(f"name at least one parameter, out of {', '.join(known)}", "free")
     for name in free:
         if name not in known:
             message = f"{brief(name)} is not a parameter of the {config.tier.name} model{suggestion(name, known)}"
-            raise fault_of(f"{message}; these can be free: {', '.join(known)}")
+            raise fault_of(f"{message}; these can be free: {', '.join(known)}", "free")
     if config.cases:
         raise config.error(("cases",), "cannot be fitted; a fit takes a single body")
     if more := [name for name in config.axes if name not in free]:

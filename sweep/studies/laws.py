@@ -44,11 +44,11 @@ def fitted(
     """Fit as `sweep.api.fit`; `columns` names the time and data columns."""
     free, laws = _names(free, "free"), _names(laws, "laws")
     if laws and (config.origin or config.model != "slip"):
-        raise fault_of("laws of friction can be compared only in the slip model; set model: slip")
+        raise fault_of("can be compared only in the slip model; set model: slip", "laws")
     for name in laws:
         if name not in LAWS:
             words = f"{brief(name)} is not a law of friction{suggestion(name, LAWS)}"
-            raise fault_of(f"{words}; choose from {', '.join(LAWS)}")
+            raise fault_of(f"{words}; choose from {', '.join(LAWS)}", "laws")
     film, note = film if isinstance(film, Film) else read(film, *columns), reporter.note
     config = with_optional(config, free)
     if not laws:

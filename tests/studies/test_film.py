@@ -96,7 +96,7 @@ def test_the_accelerations_of_a_logger_are_no_spins(write: Write) -> None:
 
 def test_degrees_taken_for_radians_are_refused(write: Write) -> None:
     path = write(table("t (s),n", TIMES, 400 + SPINS), "film.csv")
-    with pytest.raises(InputError, match="the film turns at 401 rad/s; if its spins are in degrees, name the unit"):
+    with pytest.raises(InputError, match="film: turns at 401 rad/s; if its spins are in degrees, name the unit"):
         sweep.fit(write(STONE), path, ["mu"])
 
 
@@ -199,9 +199,9 @@ def test_repeated_instants_and_gaps_are_kept(write: Write) -> None:
 @pytest.mark.parametrize(
     ("header", "clock", "words"),
     [
-        ("t,n", 1e9, "the film lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its"),
+        ("t,n", 1e9, "film: lasts 1.9e+09, but trajectories 5; raise t_end, or cut the film; if its"),
         ("t,n", 1e3, "name the unit in the header, such as 'time (ms)'"),
-        ("t (s),n", 1e3, "the film lasts 1900, but trajectories 5; raise t_end, or cut the film"),
+        ("t (s),n", 1e3, "film: lasts 1900, but trajectories 5; raise t_end, or cut the film"),
     ],
 )
 def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
@@ -218,5 +218,5 @@ def test_a_film_in_another_unit_of_time_is_refused_before_it_is_followed(
 
 def test_a_film_in_seconds_needs_a_body_in_si(write: Write) -> None:
     path = write(table("t (s),n", TIMES, SPINS), "film.csv")
-    with pytest.raises(InputError, match=r"the film gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
+    with pytest.raises(InputError, match=r"film: gives times in s; set units: SI, or convert all to sqrt\(c/g\)"):
         sweep.fit(write("friction: {mu: [30, 100]}\n"), path, ["mu"])

@@ -471,17 +471,21 @@ def test_degrees_taken_for_radians_are_refused_at_once(write: Write) -> None:
     ("free", "overrides", "words"),
     [
         (["muu"], {}, "muu is not a parameter of the slip model (did you mean mu?); these can be free: a, b"),
-        ([], {}, "name at least one free parameter"),
+        ([], {}, "free: name at least one parameter"),
         (["n0"], {}, "has several values; make it free, or give one value"),
         (
             ["mu", "n0", "a"],
             {"x0": 5.0},
             "the range of a free parameter is too wide: start point off the ellipsoid at x0",
         ),
-        (["mu", "n0", "x0", "y0", "a", "b", "delta", "film_delay", "film_bias"], {}, "9 parameters are free"),
+        (
+            ["mu", "n0", "x0", "y0", "a", "b", "delta", "film_delay", "film_bias"],
+            {},
+            "free: 9 parameters, and the film",
+        ),
         (["mu", "n0", "delta"], {"delta": 0.0}, "give the ends of its range as two values"),
         (["mu"], {"model": "analytic", "n0": 0.05}, "is not simulated"),
-        (["mu"], {"laws": ["viscuos"]}, "viscuos is not a law of friction (did you mean viscous?); choose from vis"),
+        (["mu"], {"laws": ["viscuos"]}, "laws: viscuos is not a law of friction (did you mean viscous?); "),
     ],
 )
 def test_what_cannot_be_fitted_is_refused(write: Write, free: list[str], overrides: dict[str, Any], words: str) -> None:
