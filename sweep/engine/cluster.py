@@ -22,7 +22,7 @@ from sweep.engine.plan import kernels
 from sweep.faults import FileError, fault_of, refusal
 from sweep.grid import Tile
 from sweep.interrupt import point
-from sweep.kernels.build import APPROACH, build
+from sweep.kernels.build import FAILING, build
 from sweep.kernels.layout import LANES
 from sweep.results.provenance import Identity, identify, sources
 
@@ -52,7 +52,7 @@ def run_tiles(client: Client, config: Config, tiles: Sequence[Tile], todo: Seque
     from distributed import CancelledError, KilledWorker, as_completed
 
     if config.simulated and _on_this_machine(client):
-        build(kernels(config), APPROACH)  # once, into the cache that those workers read
+        build(kernels(config), FAILING)  # once, into the cache that those workers read
     # A task's result rather than scattered data, which would be lost along with the workers that hold it.
     shared = client.submit(tuple, [config, list(tiles), identify(config)], pure=False)
     numbers = {client.submit(_work, shared, some, pure=False): some for some in _tasks(client, config, tiles, todo)}

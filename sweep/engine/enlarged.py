@@ -17,7 +17,6 @@ from sweep.engine.whole import Whole
 from sweep.grid import Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures import MEASURES
-from sweep.kernels.methods import METHODS
 from sweep.kernels.status import TIME_LIMIT
 from sweep.models.model import Model
 from sweep.parameters import Parameter, sections
@@ -146,9 +145,9 @@ def _depends_on_limit(config: Config, grid: Grid, there: xr.Dataset, cells: Arra
         at = choice.cells
         left = (t_end - before("t_stop")[at]) / before("step")[at]
         step = config.integrator.t_end / steps_to(config.integrator.t_end, choice.step)
-        depends[at] |= (left <= METHODS[choice.method].horizon) | (step != before("step")[at])
+        depends[at] |= (left <= choice.kernel.stepper.horizon) | (step != before("step")[at])
         if "method" in there:
-            depends[at] |= before("method")[at] != METHODS[choice.method].code
+            depends[at] |= before("method")[at] != choice.kernel.stepper.code
     return depends
 
 

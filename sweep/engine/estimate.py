@@ -8,14 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine.cells import Cells
 from sweep.engine.executor import nominal_seconds
 from sweep.engine.local import BATCH
-from sweep.engine.plan import choose, kernels
+from sweep.engine.plan import Choice, choose, kernels
 from sweep.faults import duration
 from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing
-from sweep.kernels.methods import METHODS
 from sweep.models import MODELS
 from sweep.models.user.blame import blamed
 
@@ -60,14 +58,14 @@ def estimate(config: Config) -> str:
     )
 
 
-def _works(config: Config, chosen: tuple[Cells, ...], steps: list[Array], share: float) -> Iterator[Array]:
+def _works(config: Config, chosen: tuple[Choice, ...], steps: list[Array], share: float) -> Iterator[Array]:
     """Return the work for each cell, in steps of dopri5 alone: for each method."""
     if not chosen:
         return  # no body of the sample is possible
     relative = 1.0 if config.equations.name in MODELS else _GENERAL
-    relative *= math.prod(each.cost for each in chosen[0].kernel.measurements)
+    relative *= math.prod(each.cost for each in chosen[0].kernel.kinds)
     for each, theirs in zip(chosen, steps, strict=True):
-        method = METHODS[each.method]
+        method = each.kernel.stepper
         work = method.step_cost * relative * (theirs + method.start_up_cost)
         work *= 1 + 1 / method.longer if config.integrator.estimate_errors else 1
         yield np.resize(work, round(len(work) * share))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from sweep.engine.cells import DONE, Lives
+from sweep.engine.lives import DONE, Lives, Next
 from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.jit import threads
@@ -32,7 +32,9 @@ UNTIL_ALL_STOP = 2**40
 
 
 def keep_busy(
-    lives: Sequence[Lives], proceed: Callable[[Lives, Array], None], after_chunk: Callable[[], None] = lambda: None
+    lives: Sequence[Lives],
+    next_of: Callable[[Lives, Array], Iterable[tuple[Array, Next]]],
+    after_chunk: Callable[[], None] = lambda: None,
 ) -> None:
     """Run the cells of `lives` through all their stages.
 
@@ -41,7 +43,7 @@ def keep_busy(
 
     Parameters
     ----------
-    proceed : called with cells whose stages have ended, to start their next stages
+    next_of : called with cells whose stages have ended; says which of them go where next
     after_chunk : called after each chunk, when all is consistent: to report, save, or stop by raising an exception
     """
     blocks = [1] * len(lives)
@@ -50,9 +52,10 @@ def keep_busy(
             few = len(each.running) < _ENOUGH * threads() * LANES
             if len(each.quiet) >= (1 if few else _TOGETHER):
                 kernel = each.cells.kernel
-                kernel.stepper.between(kernel, each.cells.rows)
+                kernel.stepper.between(kernel, each.rows)
             if len(ended := each.ended) >= (1 if few else _TOGETHER):
-                proceed(each, ended)
+                for which, to in next_of(each, ended):
+                    each.enter(which, to)
         waiting = [(i, which) for i, each in enumerate(lives) if len(which := each.running)]
         if not waiting and all((each.stage == DONE).all() for each in lives):
             return
@@ -64,7 +67,7 @@ def keep_busy(
 
 def _advance(lives: Lives, which: Array, blocks: int) -> int:
     """Advance the cells `which` by `blocks` in every lane; return how many blocks the next chunk should have."""
-    kernel, rows = lives.cells.kernel, lives.cells.rows
+    kernel, rows = lives.cells.kernel, lives.rows
     table, began = kernel.table(rows), time.perf_counter()
     left = table["goal"][which] - table["done"][which]
     least = max(1, int(blocks * _SHORT / CHUNK_SECONDS))

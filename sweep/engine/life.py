@@ -1,52 +1,239 @@
 """Takes a cell from its start to a result that can be trusted.
 
-run → is it over → is its failure genuine → companion → is it within its tolerance → repeat with shorter steps, or done
+    run → over? → failed? → second run → within its tolerance? → done
+     ↑              ↓ yes                        ↓ no
+     │           approach → the same twice?      │
+     └───── repeat with a shorter step ──────────┘
 
-Each stage decides for all cells at once that have reached its end, and each cell by its own results alone.
+When a stage of a cell has ended, `next_of` says where the cell goes next; the queue (`sweep.engine.executor`) applies
+it. Each cell is judged by its own results alone, so nothing depends on which cells are with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from sweep.engine import ending, errors, failures
-from sweep.engine.cells import APPROACH, COMPANION, DONE, RUN, Cells, Lives
+from sweep.engine import failures, over
+from sweep.engine.cells import Cells
+from sweep.engine.errors import OF_RATTLE, Errors, allowed, compare, imbalance, limited_by_round_off, second_steps
 from sweep.engine.executor import keep_busy
+from sweep.engine.failures import Met
+from sweep.engine.lives import (
+    APPROACH,
+    DONE,
+    FIRST,
+    RUN,
+    SECOND,
+    Approach,
+    Done,
+    Lives,
+    Next,
+    Repeat,
+    Run,
+    Second,
+    note,
+)
 from sweep.grid import Array
-from sweep.kernels.methods import METHODS
+from sweep.kernels.kernel import FAILURE
+from sweep.kernels.layout import Table
+from sweep.kernels.status import DIVERGED, FAILURES, SETTLED
+from sweep.models.model import take
 
+Going = Iterator[tuple[Array, Next]]
+"""Indices of cells, and where they go next."""
 
-def begin(parts: Sequence[Cells]) -> list[Lives]:
-    """Set up the lives of cells whose state rows are at t = 0."""
-    lives = [Lives(part) for part in parts]
-    for each in lives:
-        every = np.arange(len(each.cells.cells))
-        ending.begin(each, every, each.cells.rows.copy())
-    return lives
+MOST_STEPS = 1e8
+"""Steps above which no further repeat is tried: a minute for one cell, or for all that fill the lanes next to it."""
 
 
 def live(lives: Sequence[Lives], after_chunk: Callable[[], None] = lambda: None) -> None:
     """Take all cells through their lives; `after_chunk` as for `keep_busy`."""
-    keep_busy(lives, proceed, after_chunk)
+    keep_busy(lives, next_of, after_chunk)
 
 
-def proceed(lives: Lives, which: Array) -> None:
-    """Move the cells `which`, whose stages have ended, to their next stages."""
+def next_of(lives: Lives, which: Array) -> Going:
+    """Say where the cells `which` go, whose stages have ended."""
     stage = lives.stage[which]
-    over = ending.over(lives, which[stage == RUN])
-    known = [failures.look_at(lives, over), failures.after_approach(lives, which[stage == APPROACH])]
-    run = np.concatenate(known)
-    failures.deny_unsound(lives, run)
-    failed = lives.take(run).failed
-    sound, done = run[~failed], [run[failed]]
-    if lives.cells.rules.twice:
-        errors.accompany(lives, sound)
+    for ended, rules in ((RUN, _after_run), (APPROACH, _after_approach), (SECOND, _after_second_run)):
+        if (stage == ended).any():
+            yield from rules(lives, which[stage == ended])
+
+
+def _after_run(lives: Lives, which: Array) -> Going:
+    """Is it over? A run goes on if it has ended too early (`sweep.engine.over`).
+
+    A failed run is examined. Any other is judged at once: it has met nothing.
+    """
+    run, settles = lives.take(which), lives.cells.rules.settles
+    left = over.predicted(run, at_limit=settles)
+    early, (final, further) = over.too_early(run, left), over.at_limit(run, left)
+    further &= settles & (lives.cells.rules.first_leg is not None) & (lives.notes["leg"][which] == FIRST)
+    note(lives.notes, "left", which, left)
+    lives.table["status"][which[final & settles]] = SETTLED
+    yield which[early], Run(settles=False)
+    yield which[further], Run(settles=True)
+    yield which[run.failed], Approach()
+    sound = which[~(early | further | run.failed)]
+    yield from _judged(lives, sound, Met.nothing(len(sound)))
+
+
+def _after_approach(lives: Lives, which: Array) -> Going:
+    """Find out what failed runs have met, and judge them."""
+    failed = lives.take(which, lives.aside)
+    met = failures.met(failed, lives.rows[which])
+    lives.rows[which] = failed.rows
+    yield from _judged(lives, which, met)
+
+
+ROUNDS, FALSE_ROUNDS = 3, 8
+"""Largest number of repeats because of a failure, each with half the step of the one before; and the same if every run
+so far has failed spuriously, which makes its numbers worthless."""
+
+SAME = 1e-6
+"""Largest time difference at which two runs meet the same failure, in sqrt(c/g)."""
+
+
+def _judged(lives: Lives, which: Array, met: Met) -> Going:
+    """Did it truly fail? The cells have ended, and `met` something, or nothing.
+
+    A failure is a statement about physics, so one run does not settle it: it is genuine if two runs, the second with
+    half the step of the first, meet the same one at the same time. The row then gets its status, its time and the spin
+    at that time. Otherwise the step is halved again, until a run ends soundly; that run replaces the first. A run that
+    still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy balance is off
+    by more than `UNSOUND`.
+
+    With a fixed step, the run with half the step only confirms.
+    """
+    notes, rules, now = lives.notes[which], lives.cells.rules, lives.take(which)
+    unsound, begun = failures.unsound(now), notes["halvings"] > 0
+    before = Met(*(notes["met"][name].copy() for name in Met._fields))
+    if rules.fixed:
+        last, within = begun, notes["step_before"]
     else:
-        done.append(sound)
-    done.append(errors.after_companion(lives, which[stage == COMPANION]))
-    lives.notes["stage"][np.concatenate(done)] = DONE
+        rounds = np.where(now.failed & ~met.agrees(before, np.inf), FALSE_ROUNDS, ROUNDS)
+        last = (notes["halvings"] >= rounds) | (begun & (2 * now.table["done"] > MOST_STEPS))
+        within = np.where(last & ~unsound, np.inf, SAME)
+    true = met.agrees(before, within)
+    doubtful = ~true & (now.failed | (unsound & (not rules.fixed)))
+    again = doubtful & ~last
+    if again.any():
+        on = which[again]
+        note(lives.notes, "met", on, take(met, again))
+        lives.notes["halvings"][on] += 1
+        lives.notes["step_before"][on], lives.before[on] = now.step[again], now.rows[again]
+        yield on, Repeat(now.step[again] / 2)
+    here = which[~again]
+    if rules.fixed:
+        back = here[begun[~again]]
+        lives.rows[back], lives.notes["step"][back] = lives.before[back], lives.notes["step_before"][back]
+    lives.notes["missed"][here] = doubtful[~again] & (not rules.fixed)
+    table = lives.cells.kernel.table(lives.rows[here])
+    _set_failures(lives.cells, table, take(met, ~again), take(before, ~again), true[~again])
+    failed = np.isin(table["status"], FAILURES)
+    table["status"] = np.where(unsound[~again] & ~failed, DIVERGED, table["status"])
+    lives.rows[here], lives.notes["halvings"][here], lives.notes["met"][here] = table.rows, 0, 0
+    failed = np.isin(table["status"], FAILURES)
+    yield here[failed], Done()
+    yield from _run_twice(lives, here[~failed])
+
+
+def _set_failures(cells: Cells, table: Table, met: Met, before: Met, true: Array) -> None:
+    """Set the final statuses of the rows in `table`, and the time of each failure and the spin at that time.
+
+    A failure that is not `true` is an artefact of the integration. `before` holds what the runs with steps of twice the
+    length have met.
+    """
+    error = np.maximum(np.abs(met.spin - before.spin) / (2**cells.kernel.stepper.error_order - 1), met.doubt)
+    failed = np.isin(table["status"], FAILURES)
+    table["status"] = np.where(true, met.kind, np.where(failed, DIVERGED, table["status"]))
+    for name, values in zip(FAILURE, (met.time, met.spin, error), strict=True):
+        table[name] = np.where(true, values, 0.0)
+
+
+def _run_twice(lives: Lives, which: Array) -> Going:
+    """Run sound cells a second time, with longer steps, to the times at which they ended.
+
+    Where round-off decides when a cell ends, its second run goes to an end of its own.
+    """
+    if not lives.cells.rules.twice:
+        yield which, Done()
+    elif len(which):
+        run = lives.take(which)
+        by_itself = limited_by_round_off(run) & run.rules.settles
+        yield which, Second(second_steps(run), np.where(by_itself, run.rules.t_end, run.times), by_itself)
+
+
+def _after_second_run(lives: Lives, which: Array) -> Going:
+    """Is it within its tolerance? The second run gives the error of the first (`sweep.engine.errors`).
+
+    A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, until the error is below
+    `AIM` times the tolerance. A cell whose error stays above the tolerance has missed it.
+
+    After a reversal that grew from round-off the error is unknown: the cell is neither repeated nor said to miss its
+    tolerance.
+    """
+    first, second, notes = lives.take(which, lives.aside), lives.take(which), lives.notes
+    found = compare(first, second, lives.left(which))
+    known = ~limited_by_round_off(first)
+    shorter, most = _shorter(first, found, notes["repeats"][which], notes["most_error"][which])
+    again = known & np.isfinite(shorter) & first.rules.repeats
+    lives.rows[which] = first.rows
+    note(notes, "error", which, found)
+    notes["missed"][which] = ~again & known & (found.reported > allowed(first)) & (not first.rules.fixed)
+    notes["repeats"][which] += again
+    notes["most_error"][which[again]] = most[again]
+    yield which[again], Repeat(first.step[again] / shorter[again])
+    yield which[~again], Done()
+
+
+REPEATS = 3
+"""Largest number of repeats of a cell because of its error."""
+
+AIM = 0.5
+"""Share of the tolerance to which an error is reduced: for most cells it is known within a factor of two."""
+
+SHORTEST = 8.0
+"""Largest factor by which a repeat shortens the step. An error that needs more is treated as one that the motion
+amplifies without bound."""
+
+AMPLIFIED = 1e3
+"""Ratio of an error to the estimate from the energy balance above which no step shorter by more than `_MILD` is tried:
+the motion amplifies errors so much that it amplifies round-off too."""
+
+APART = 0.1
+"""The same for the difference of the two spins relative to their size: above it they have nothing in common."""
+
+_MILD = 2.0
+
+# A step that is shorter by some factor has to reduce the error by at least this power of the factor. Otherwise a
+# further step is of no use.
+_LEAST_ORDER = 3
+
+# The order assumed for both methods when a step is shortened.
+_ORDER = 5
+
+
+def _shorter(first: Cells, errors: Errors, repeats: Array, most: Array) -> tuple[Array, Array]:
+    """Return the factors by which to shorten the steps, and the largest errors with which to repeat again, (cells,).
+
+    A factor is NaN if the error is small enough, or if no shorter step is of use.
+
+    Parameters
+    ----------
+    repeats, most : the number of repeats so far, and the largest error with which another is of use, shape (cells,)
+    """
+    aim = AIM * allowed(first)
+    large = errors.spin > aim
+    by_chance = ~large & (OF_RATTLE * errors.rattle > aim)
+    shorter = np.fmax((errors.spin / aim) ** (1 / _ORDER), 1.0)
+    shorter = np.where(np.isinf(errors.spin) | by_chance, first.kernel.stepper.longer, shorter)
+    hopeless = (shorter > SHORTEST) | (errors.spin > most)
+    hopeless |= (shorter > _MILD) & ((errors.spin > AMPLIFIED * imbalance(first)) | (errors.apart > APART))
+    long = np.fmin(shorter, SHORTEST) * first.table["done"] > MOST_STEPS
+    tried = (large | by_chance) & ~hopeless & ~long & (repeats < REPEATS)
+    return np.where(tried, shorter, np.nan), np.where(by_chance, np.inf, errors.spin / shorter**_LEAST_ORDER)
 
 
 def progress(lives: Sequence[Lives]) -> tuple[float, int]:
@@ -57,15 +244,15 @@ def progress(lives: Sequence[Lives]) -> tuple[float, int]:
     cells = failed = 0
     done, left = 0.0, 0.0
     for each in lives:
-        kernel, stage = each.cells.kernel, each.stage
-        now, before = kernel.table(each.cells.rows), kernel.table(each.aside)["done"]
+        stage, now, before = each.stage, each.table, each.cells.kernel.table(each.aside)["done"]
         first = np.isin(stage, (RUN, APPROACH))
-        again = 1 / METHODS[each.cells.method].longer if each.cells.rules.twice else 0.0
-        ended = np.where(stage == COMPANION, before, now["done"])[~first]
+        again = 1 / each.cells.kernel.stepper.longer if each.cells.rules.twice else 0.0
+        ended = np.where(stage == SECOND, before, now["done"])[~first]
         usual = np.maximum(ended.mean() if len(ended) else now["goal"][first].mean(), now["done"][first])
-        done += now["done"].sum() + before[stage == COMPANION].sum() + again * now["done"][stage == DONE].sum()
+        done += now["done"].sum() + before[stage == SECOND].sum() + again * now["done"][stage == DONE].sum()
         left += ((1 + again) * usual - now["done"][first]).sum()
         usual = np.minimum(now["goal"], again * before)
-        left += np.maximum(usual - now["done"], 0)[stage == COMPANION].sum()
-        cells, failed = cells + len(stage), failed + int((each.cells.failed & (stage == DONE)).sum())
+        left += np.maximum(usual - now["done"], 0)[stage == SECOND].sum()
+        status = now["status"][stage == DONE]
+        cells, failed = cells + len(stage), failed + int(np.isin(status, FAILURES).sum())
     return cells * (done / (done + left) if done else 0.0), failed

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine.errors import results
-from sweep.engine.life import begin, live, progress
+from sweep.engine.life import live, progress
+from sweep.engine.lives import Lives
+from sweep.engine.outcome import results
 from sweep.engine.plan import plan
 from sweep.grid import Array, Grid, Tile
 from sweep.interrupt import point
@@ -54,7 +54,7 @@ def run_batch(
     for part in job.parts:
         part.kernel.advancing.compile()
     began = time.perf_counter() - (left.seconds if left else 0)
-    lives = begin(job.parts)
+    lives = [Lives(part) for part in job.parts]
     for each in lives:
         each.resume(left.tables if left else {})
 
@@ -66,7 +66,6 @@ def run_batch(
         after_chunk(*progress(lives))
 
     live(lives, report)
-    job = replace(job, parts=tuple(each.cells for each in lives))
     found = results(job, lives)
     cost = {"seconds": np.array((time.perf_counter() - began) / len(batch)), "cpu": cpu}
     for i, arrays in zip(batch, job.by_grid(found), strict=True):

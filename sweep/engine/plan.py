@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,17 +18,15 @@ from sweep.kernels.build import build
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.method import FIXED, Tolerance
 from sweep.kernels.methods import AUTO, METHODS
-from sweep.kernels.status import IMPOSSIBLE
-from sweep.models.model import Columns
+from sweep.models.model import Columns, take
 from sweep.models.theory.linear import fastest_spin
 from sweep.prediction import Prediction, decay_times, predict
-from sweep.results import dataset
 
 TOLERANCE_TIME = 400.0
 """The time in sqrt(c/g) to which a tolerance refers; the permitted error of a longer run grows in proportion."""
 
-_DECAY_TIMES, _SLOW, _LOOSEST = 2.0, 1.5, 8.0
-"""The least length of the run of a slow body, in decay times of its rattle; the largest angle by which a slow body can
+_DECAY_TIMES, _TURN, _LOOSEST = 2.0, 1.5, 8.0
+"""The least length of the run of a calm body, in decay times of its rattle; the largest angle by which a calm body can
 turn in a period of its rattle; and the largest ratio of the tolerance for a first step to the tolerance."""
 
 # Each kernel is made once in a process, because its machine code takes a second to load.
@@ -46,23 +45,6 @@ class Plan:
     """One part, unless the configuration lets the method be chosen for each cell (`method: auto`). Cells of impossible
     bodies are in none."""
 
-    def results(self) -> dict[str, Array]:
-        """Collect the simulated variables by name, each over all cells, once all trajectories have ended."""
-        size = sum(grid.size for grid in self.grids)
-        arrays: dict[str, Array] = {}
-        for part in self.parts:
-            found = dataset.measured(part.kernel, part.rows, self.config.integrator.t_end)
-            found["step_rule"] = part.step_rule
-            if self.config.integrator.method == AUTO:
-                found["method"] = np.full(len(part.cells), METHODS[part.method].code)
-            for name, values in found.items():
-                nothing = np.nan if dataset.VARIABLES[name].dtype.startswith("float") else 0
-                blank = np.full((size, *values.shape[1:]), nothing)
-                arrays.setdefault(name, blank)[part.cells] = values
-        simulated = np.concatenate([part.cells for part in self.parts])
-        arrays["status"][np.delete(np.arange(size), simulated)] = IMPOSSIBLE
-        return arrays
-
     def by_grid(self, arrays: dict[str, Array]) -> list[dict[str, Array]]:
         """Split `arrays` over all cells by grid, and add the predictions for cells and bodies."""
         ends = np.cumsum([grid.size for grid in self.grids])
@@ -70,6 +52,20 @@ class Plan:
             {name: values[end - grid.size : end] for name, values in arrays.items()} | prediction.variables
             for grid, prediction, end in zip(self.grids, self.predictions, ends, strict=True)
         ]
+
+
+class Choice(NamedTuple):
+    """How to run the cells of one method."""
+
+    kernel: Kernel
+    cells: Array
+    """Indices among all cells, shape (cells,)."""
+    columns: Columns
+    """Physical parameters by name, each of shape (cells,)."""
+    step: Array
+    """The longest permitted step, in sqrt(c/g), shape (cells,)."""
+    step_rule: Array
+    """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
 
 
 def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
@@ -81,15 +77,21 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     chosen = choose(config, *grids)
     build(kernels(config, chosen), *also)
     predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
-    stable = np.concatenate([each.ranges for each in predictions], axis=1)
-    parts = [replace(each, stable=stable[:, each.cells]) for each in chosen]
-    return Plan(config, grids, predictions, tuple(replace(part, rows=part.start()) for part in parts))
+    stable, how = np.concatenate([each.ranges for each in predictions], axis=1), config.integrator
+    fixed = how.step != "auto"
+    rules = Rules(
+        how.t_end, how.tolerance, how.first_leg, how.settles, fixed, how.estimate_errors, config.repeats and not fixed
+    )
+    parts = tuple(Cells.at_start(config.equations, rules, *each, stable[:, each.cells]) for each in chosen)
+    return Plan(config, grids, predictions, parts)
 
 
-def kernels(config: Config, chosen: Sequence[Cells] = ()) -> list[Kernel]:
+def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
     """Return the kernels that run the cells of `chosen`, or all that a run may need."""
     method = config.integrator.method
-    names = [each.method for each in chosen] or (methods.automatic(config.equations) if method == AUTO else [method])
+    names = [each.kernel.method for each in chosen] or (
+        methods.automatic(config.equations) if method == AUTO else [method]
+    )
     return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
 
@@ -98,7 +100,7 @@ def kernel_of(method: str, config: Config) -> Kernel:
     return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
 
 
-def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
+def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
     """Choose method and step of each cell of `grids` that has a possible body, without compiling or initial states.
 
     If there are no such cells, there is one choice with no cells.
@@ -107,9 +109,9 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
     each = [grid.columns() for grid in grids]
     columns = {name: np.concatenate([some[name] for some in each]) for name in each[0]}
     possible = np.flatnonzero(~model.impossible(columns))
-    columns = {name: values[possible] for name, values in columns.items()}
+    columns = take(columns, possible)
     if not len(possible):
-        return (_cells(kernels(config)[0], config, possible, columns, np.empty(0), np.empty(0)),)
+        return (Choice(kernels(config)[0], possible, columns, np.empty(0), np.empty(0)),)
     tolerance = np.concatenate([first_tolerance(config, grid) for grid in grids])[possible]
     if integrator.method == AUTO:
         chosen, steps, rules = methods.cheapest(model, columns, tolerance, integrator.t_end)
@@ -119,38 +121,27 @@ def choose(config: Config, *grids: Grid) -> tuple[Cells, ...]:
     choices = []
     for method in METHODS:
         if len(cells := np.flatnonzero(chosen == method)):
-            theirs = {name: values[cells] for name, values in columns.items()}
-            kernel = kernel_of(method, config)
-            choices.append(_cells(kernel, config, possible[cells], theirs, steps[cells], rules[cells]))
+            kernel, theirs = kernel_of(method, config), take(columns, cells)
+            choices.append(Choice(kernel, possible[cells], theirs, steps[cells], rules[cells]))
     return tuple(choices)
-
-
-def _cells(kernel: Kernel, config: Config, cells: Array, columns: Columns, step: Array, step_rule: Array) -> Cells:
-    how, fixed = config.integrator, config.integrator.step != "auto"
-    rules = Rules(
-        how.t_end, how.tolerance, how.first_leg, how.settles, fixed, how.estimate_errors,
-        config.repeats and not fixed,
-    )  # fmt: skip
-    blank = np.full((7, len(cells)), np.nan), np.empty((0, 0))
-    return Cells(kernel, config.equations, rules, cells, columns, step, step_rule, *blank)
 
 
 def first_tolerance(config: Config, grid: Grid) -> Array:
     """Return the tolerance for which the first step of each cell is chosen, shape (cells,).
 
-    It exceeds the tolerance itself if the run will be long, and if a companion will show whether its error is too large
-    and the cell has to be repeated: the permitted error grows with time, and a long run forgets its early errors. With
-    the step for the tolerance itself, half of the cells of `configs/mu_b.yaml` end with less than a hundredth of the
-    permitted error (scripts/LOG.md). A body that spins fast may soon lift off or topple, so its run may be short.
+    It exceeds the tolerance itself if the run will be long, and if a second run will show whether its error is too
+    large and the cell has to be repeated: the permitted error grows with time, and a long run forgets its early errors.
+    With the step for the tolerance itself, half of the cells of `configs/mu_b.yaml` end with less than a hundredth of
+    the permitted error (scripts/LOG.md). A body that spins fast may soon lift off or topple, so its run may be short.
     """
     how, model, columns = config.integrator, config.equations, grid.columns()
     if not (how.estimate_errors and config.repeats and how.step == "auto"):
         return np.full(grid.size, how.tolerance)
     least, possible = np.zeros(grid.size), ~model.impossible(columns)
-    columns = {name: values[possible] for name, values in columns.items()}
-    slow = fastest_spin(model, columns) * model.slower_period(columns) < _SLOW
+    columns = take(columns, possible)
+    calm = fastest_spin(model, columns) * model.slower_period(columns) < _TURN
     decay = decay_times(model, grid)[possible] * model.spin_unit(columns)
-    least[possible] = np.where(slow, _DECAY_TIMES * decay, 0.0)
+    least[possible] = np.where(calm, _DECAY_TIMES * decay, 0.0)
     return np.asarray(how.tolerance * np.clip(least / TOLERANCE_TIME, 1.0, _LOOSEST))
 
 

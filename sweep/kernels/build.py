@@ -1,7 +1,7 @@
 """Compile the pieces of kernels into the cache, side by side, each in its own process.
 
 The arguments of such a process are PIECE METHOD MODEL [MEASURE …]. A PIECE is `kernel`, or another part that runs need:
-`beginning` and `endings`, `path` for single trajectories, `approach` once a trajectory has failed, and `exchange` and
+`beginning` and `endings`, `path` for single trajectories, `failing` once a trajectory has failed, and `exchange` and
 `follow` for estimated counts. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line
 of standard input.
 
@@ -43,7 +43,7 @@ from sweep.models.user.blame import blamed
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and the origin of the model."""
 
-KERNEL, BEGINNING, ENDINGS, PATH, APPROACH = "kernel", "beginning", "endings", "path", "approach"
+KERNEL, BEGINNING, ENDINGS, PATH, FAILING = "kernel", "beginning", "endings", "path", "failing"
 _EXCHANGE, _FOLLOW = "exchange", "follow"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
@@ -51,13 +51,13 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     BEGINNING: lambda kernel: kernel.stepper.prepared_by(kernel.model),
     ENDINGS: lambda kernel: (compiled_following(),) if Offer.ENDING in kernel.model.offers else (),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
-    APPROACH: lambda kernel: (compiled_approach(kernel.model),),
+    FAILING: lambda kernel: (compiled_approach(kernel.model),),
     _EXCHANGE: lambda kernel: (compiled_exchange(kernel.model),),
     _FOLLOW: lambda kernel: (compiled_follow(),),
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {BEGINNING: 4.0, ENDINGS: 3.0, PATH: 4.0, APPROACH: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
+_SECONDS = {BEGINNING: 4.0, ENDINGS: 3.0, PATH: 4.0, FAILING: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _DOES_NOT_COMPILE = 3
@@ -70,7 +70,7 @@ _POLL = 0.05
 def build(kernels: Iterable[Kernel], *also: str) -> None:
     """Compile the pieces that the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
-    `also` names further pieces: `PATH` to follow how bodies turn and travel, `APPROACH` to look at failures.
+    `also` names further pieces: `PATH` to follow how bodies turn and travel, `FAILING` to look at failures.
 
     Anything still missing afterwards, because a process failed or there is no folder for a cache, is compiled where it
     is first used.
@@ -130,7 +130,7 @@ def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]
     for piece in pieces:
         if any(function.is_missing() for function in _PIECES[piece](kernel)):
             method = kernel.method if piece in (KERNEL, BEGINNING) else PLAIN
-            measure = (each.spec for each in kernel.measurements if each.in_kernel and piece == KERNEL)
+            measure = (each.spec for each in kernel.measurements if piece == KERNEL)
             yield piece, method, kernel.model.key, *measure
 
 

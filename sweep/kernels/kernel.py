@@ -19,7 +19,7 @@ from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, any_true, call_all, make_load
 from sweep.kernels.lanes import make_advance, make_check
 from sweep.kernels.layout import STABLE, Layout, Table, constants_of
-from sweep.kernels.measures.measurement import Measurement, Step
+from sweep.kernels.measures.measurement import Kind, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 
 FAILURE = ("failed_at", "failed_spin", "failed_error")
@@ -152,20 +152,21 @@ class Kernel:
 
     Attributes
     ----------
-    measure : the specs of the measurements
+    measure : the specs of the `kinds` of what is measured or found, of which the `measurements` are part of the kernel
     work, ripple : whether a measurement needs the work of friction, or the ripple-free spin, in each step
     constants : names of the quantities that hold the constants of the model
     advancing : the compiled function behind `advance`
     """
 
-    def __init__(self, stepper: Stepper, model: Model, measurements: Sequence[Measurement], tolerance: float) -> None:
-        self.stepper, self.model, self.measurements = stepper, stepper.steps_in(model), tuple(measurements)
-        self.tolerance, self.method, self.measure = tolerance, stepper.name, tuple(each.spec for each in measurements)
-        self.work, self.ripple = (any(getattr(each, name) for each in measurements) for name in ("work", "ripple"))
+    def __init__(self, stepper: Stepper, model: Model, kinds: Sequence[Kind], tolerance: float) -> None:
+        self.stepper, self.model, self.kinds = stepper, stepper.steps_in(model), tuple(kinds)
+        self.measurements = tuple(each for each in kinds if isinstance(each, Measurement))
+        self.tolerance, self.method, self.measure = tolerance, stepper.name, tuple(each.spec for each in kinds)
+        self.work, self.ripple = (any(getattr(each, name) for each in self.measurements) for name in ("work", "ripple"))
         self.constants = constants_of(self.model)
         self._ripple = self.model.ripple if self.ripple else NO_RIPPLE
         self._ripples = tuple(f"ripple.{name}" for name in self._ripple.names)
-        measured = (name for each in measurements for name in each.quantities)
+        measured = (name for each in self.measurements for name in each.quantities)
         more = stepper.quantities(self.model, work=self.work)
         self.layout = Layout(
             (*self.model.states, *self.constants, *_BASE, *self._ripples, *measured, *more), self.model
@@ -178,7 +179,7 @@ class Kernel:
         measure = call_all("measure", "group, lane, seen", self.hooks("make_check"))
         check = make_check(self.model, self.layout, may_settle, shown, measure, self.stepper.energy_gain)
         advance = make_advance(self.stepper.body(self), check, self.layout)
-        measured = "+".join(each.spec for each in self.measurements if each.in_kernel)
+        measured = "+".join(each.spec for each in self.measurements)
         name = f"{self.model.key}-{self.method}-{measured}"
         return parallel(advance, "(f8[:, ::1], i8[::1], i8, i8, i8, i8[::1])", name)
 

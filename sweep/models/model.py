@@ -255,7 +255,9 @@ def named(*fields: str):
 
 
 def take(record: Any, cells: Any) -> Any:
-    """Select the cells with the indices `cells` from a record of arrays, such as constants; the type stays the same."""
+    """Select the cells with the indices `cells` from a record of arrays, such as constants, or from columns."""
+    if isinstance(record, Mapping):
+        return {name: values[cells] for name, values in record.items()}
     return type(record)(*(values[cells] for values in record))
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from sweep.engine.cells import Cells, Rules
 from sweep.engine.executor import execute
-from sweep.engine.life import begin, live
+from sweep.engine.life import live
+from sweep.engine.lives import Lives
 from sweep.grid import Array, Grid
 from sweep.kernels import measures, methods
 from sweep.kernels.build import build
@@ -84,12 +85,13 @@ def simulate(
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stable = predict(chosen, Grid({}, {}, dict(columns))).ranges
     steps = np.broadcast_to(steps, cells).astype(float)
-    rows = kernel.start(columns, steps, t_end, stable)
+    rules = Rules(t_end, tolerance, settles=settle)
+    start = Cells.at_start(chosen, rules, kernel, np.arange(cells), columns, steps, np.zeros(cells), stable)
     if decide:
-        rules = Rules(t_end, tolerance, settles=settle)
-        lives = begin([Cells(kernel, chosen, rules, np.arange(cells), columns, steps, np.zeros(cells), stable, rows)])
-        live(lives)
-        return Ends(kernel, lives[0].cells.rows, t_end)
+        lives = Lives(start)
+        live([lives])
+        return Ends(kernel, lives.rows, t_end)
+    rows = start.rows
     kernel.table(rows)["settles"] = settle
     execute(kernel, rows)
     return Ends(kernel, rows, t_end)

@@ -13,10 +13,12 @@ from sweep.config import Config
 from sweep.grid import CASE, SAMPLE, Array, Grid
 from sweep.kernels import measures, status
 from sweep.kernels.kernel import Kernel
+from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import COUNT_DOUBTS, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.general.surfaces import ELLIPSOID
+from sweep.models.stiff.final_spin import Ending
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.units import NUMBER, PAPER_UNITS, SPIN, TIME
 from sweep.variables import Variable, attributes
@@ -125,14 +127,18 @@ VARIABLES: dict[str, Variable] = {
 }  # fmt: skip
 
 
-def measured(kernel: Kernel, rows: Array, t_end: float | Array) -> dict[str, Array]:
-    """Return the simulated variables from final state rows, of shape (cells,) or (cells, length)."""
+def measured(kernel: Kernel, rows: Array, t_end: float | Array, left: Ending | None = None) -> dict[str, Array]:
+    """Return the simulated variables from final state rows, of shape (cells,) or (cells, length).
+
+    `left` is what is left to come of their spins, by default as the slow equations predict it.
+    """
     table = kernel.table(rows)
+    left = left or endings(table, table["status"] == SETTLED)
     times = kernel.times(rows, t_end)
     result = {"status": table["status"], "spin_final": kernel.spins(rows), "t_stop": times, "step": table["step"]}
     doubts: Array = np.zeros(len(rows), int)
-    for each in kernel.measurements:
-        result |= each.read(table, times)
+    for each in kernel.kinds:
+        result |= each.read(table, times, left)
         doubts |= each.doubts(table)
     return result | {"doubts": doubts}
 

@@ -16,11 +16,12 @@ from sweep.config import Config, ConfigLike, load_config, values_at
 from sweep.config.cross_checks import misplaced, unfit
 from sweep.config.document import is_number, plain_data
 from sweep.config.schema import FOREVER
-from sweep.engine import ending, executor
+from sweep.engine import executor, over
 from sweep.engine.cells import Cells
-from sweep.engine.errors import results
 from sweep.engine.executor import UNTIL_ALL_STOP, nominal_seconds
-from sweep.engine.life import begin, live
+from sweep.engine.life import live
+from sweep.engine.lives import Lives, note
+from sweep.engine.outcome import results
 from sweep.engine.plan import plan, steps_of
 from sweep.engine.reporter import Count, Reporter
 from sweep.faults import duration, fault_of, refusal
@@ -31,7 +32,7 @@ from sweep.kernels.build import PATH
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.methods import METHODS, PLAIN
-from sweep.kernels.status import RUNNING, TIME_LIMIT
+from sweep.kernels.status import RUNNING, SETTLED, TIME_LIMIT
 from sweep.models import attitude
 from sweep.models.model import Columns, Model, take
 from sweep.models.theory.linear import fastest_motion
@@ -145,25 +146,23 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
     """Return the trajectories of all cells of `chosen`, as `trajectory`."""
     job = plan(chosen, also=[PATH])
     (part,), (grid,) = job.parts, job.grids
-    (each,), kernel, columns = begin([part]), part.kernel, grid.columns()
-    rows, steps = each.cells.rows, part.step.copy()
+    each, kernel, columns = Lives(part), part.kernel, grid.columns()
+    rows = each.rows
     t_end, count = chosen.integrator.t_end, Count(reporter, named(u.TIME, chosen.units) or "of time")
     count.expect(len(rows) * t_end, len(rows) * t_end)
 
     def report() -> None:
         table = kernel.table(rows)
         covered = np.where(table["status"] == RUNNING, table["done"] / table["goal"], 1.0).sum() * t_end
-        count.chunk(float(covered), 0)  # companions begin at t = 0 again, which it leaves out
+        count.chunk(float(covered), 0)  # second runs begin at t = 0 again, which it leaves out
 
-    marks = _run(each.cells, rows, report)
+    marks = _run(part, rows, report)
     live([each], report)
-    if (each.cells.step != steps).any():
-        again = each.cells.start()
-        kernel.table(again)["settles"] = each.cells.rules.settles
-        marks = _run(each.cells, again)
-    _judge(each.cells)
-    ending.settle(each.cells)
-    job = replace(job, parts=(each.cells,))
+    if ((ended := each.take()).step != part.step).any():
+        again = ended.start()
+        kernel.table(again)["settles"] = part.rules.settles
+        marks = _run(part, again)
+    _judge(each)
     times = _times(kernel, rows, every or intervals(kernel.model, columns).min())
     series = _sample(kernel, marks, rows, times, kernel.model.turned(columns))
     (found,) = job.by_grid(results(job, [each]))
@@ -235,20 +234,25 @@ def _run(cells: Cells, rows: Array, after_chunk: Callable[[], None] = lambda: No
     longest = kernel.table(rows)["goal"].max() / BLOCK
     blocks = max(_BLOCKS, int(np.ceil(longest * len(rows) / _MARKS)))
     executor.execute(kernel, rows, after_chunk=mark, chunk_blocks=blocks)
-    early, table = ending.too_early(replace(cells, rows=rows)), kernel.table(rows)
+    table, ended = kernel.table(rows), replace(cells, rows=rows)
+    early = over.too_early(ended, over.predicted(ended, at_limit=False))
     table["status"][early], table["settles"][early] = RUNNING, False
     executor.execute(kernel, rows, after_chunk=mark, chunk_blocks=blocks)
     return marks
 
 
-def _judge(cells: Cells) -> None:
+def _judge(lives: Lives) -> None:
     """Give trajectories that reached their time limit the status `SETTLED` if a sweep would have ended them there."""
-    kernel, looked, at_end = cells.kernel, cells.rows.copy(), np.flatnonzero(cells.status == TIME_LIMIT)
-    table = kernel.table(looked)
+    checked, every = lives.take(), np.arange(len(lives.rows))
+    table, at_end = checked.table, np.flatnonzero(checked.status == TIME_LIMIT)
     table["status"][at_end], table["settles"] = RUNNING, True
-    kernel.advance(looked, at_end, 1)
-    table["status"][ending.too_early(replace(cells, rows=looked))] = TIME_LIMIT
-    kernel.table(cells.rows)["status"] = table["status"]
+    checked.kernel.advance(checked.rows, at_end, 1)
+    left = over.predicted(checked, at_limit=True)
+    table["status"][over.too_early(checked, left)] = TIME_LIMIT
+    final, _ = over.at_limit(checked, left)
+    table["status"][final] = SETTLED
+    lives.table["status"] = table["status"]
+    note(lives.notes, "left", every, left)
 
 
 def _times(kernel: Kernel, ends: Array, interval: float) -> Array:

@@ -11,12 +11,15 @@ from support.runs import lengthen, run_cells
 
 import sweep
 from sweep.config import load_config
-from sweep.engine import errors
+from sweep.engine import life
+from sweep.engine import plan as planning
 from sweep.engine.executor import execute
-from sweep.engine.life import begin, live
+from sweep.engine.life import live
+from sweep.engine.lives import Lives
+from sweep.engine.outcome import results
 from sweep.engine.plan import first_tolerance, kernel_of, plan, steps_of
 from sweep.kernels.method import FIXED, REPEAT
-from sweep.kernels.methods import PLAIN
+from sweep.kernels.methods import METHODS, PLAIN
 from sweep.kernels.status import SETTLED, TIME_LIMIT, Doubt
 from sweep.results.dataset import measured
 from sweep.results.summary import describe
@@ -80,7 +83,7 @@ def test_spins_alike_by_chance_are_not_believed(monkeypatch: pytest.MonkeyPatch)
     found = cells([body | start], method="adams", tolerance=chance)
     assert abs(float(found.spin_final[0]) - true) < 1e-8
     assert int(found.step_rule[0]) == REPEAT
-    monkeypatch.setattr(errors, "OF_RATTLE", 0.0)
+    monkeypatch.setattr(life, "OF_RATTLE", 0.0)
     assert abs(float(cells([body | start], method="adams", tolerance=chance).spin_final[0]) - true) > 3e-8
 
 
@@ -95,7 +98,8 @@ def test_an_error_is_not_far_below_what_is_to_be_expected(monkeypatch: pytest.Mo
         error = abs(float(found.spin_final[0]) - true)
         assert 1e-9 < error / 2 < float(found.spin_error[0]) < 2 * error
         with monkeypatch.context() as patch:
-            patch.setattr(errors, "METHODS", {"adams": replace(errors.METHODS["adams"], least_error=0.0)})
+            patch.setitem(METHODS, "adams", replace(METHODS["adams"], least_error=0.0))
+            patch.setattr(planning, "_kernel", planning._kernel.__wrapped__)
             assert float(cells(body, method="adams", tolerance=chance).spin_error[0]) < error / 10
 
 
@@ -136,7 +140,7 @@ def test_a_certain_count_does_not_depend_on_the_tolerance(tolerance: float, body
 
 
 def test_what_nobody_asked_for_is_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(errors, "companions", None)
+    monkeypatch.setattr(life, "second_steps", None)
     found = cells([BODY], method="adams", estimate_errors=False)
     assert not {"spin_error", "certain"} & set(found)
     assert not found.doubts.values[0] & (Doubt.STEP | Doubt.MARGIN | Doubt.TOLERANCE)
@@ -201,9 +205,9 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
     config = load_config(ROOT / "configs" / f"{name}.yaml", {"t_end": 1000.0})
     grid = config.grid
     job = plan(config, grid.take(np.linspace(0, grid.size - 1, min(grid.size, 240)).astype(int)))
-    lives = begin(job.parts)
+    lives = [Lives(part) for part in job.parts]
     live(lives)
-    found = errors.results(replace(job, parts=tuple(each.cells for each in lives)), lives)
+    found = results(job, lives)
     sound = np.isin(found["status"], (SETTLED, TIME_LIMIT))
     columns = {name: values[sound] for name, values in job.grids[0].columns().items()}
     kernel, times = kernel_of(PLAIN, config), found["t_stop"][sound]

@@ -11,10 +11,10 @@ from support.runs import Heard, interrupt, lengthen, run_cells, same_numbers
 
 import sweep
 from sweep.config import load_config
-from sweep.engine import failures
-from sweep.engine.cells import APPROACH, COMPANION, Lives
+from sweep.engine import failures, life
 from sweep.engine.executor import execute
-from sweep.engine.life import begin, live
+from sweep.engine.life import live
+from sweep.engine.lives import Approach, Lives, Next, Second
 from sweep.engine.plan import plan
 from sweep.kernels.method import FIXED, REPEAT
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, SETTLED, TIME_LIMIT, TOPPLED
@@ -80,7 +80,7 @@ TAPPED = {
 
 def test_a_false_failure_is_passed_however_long_the_whole_run_would_be(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only the steps that a run has taken count: the default t_end is seldom reached."""
-    monkeypatch.setattr(failures, "MOST_STEPS", 8e3)  # fewer than twice those to t_end, more than to the failure
+    monkeypatch.setattr(life, "MOST_STEPS", 8e3)  # fewer than twice those to t_end, more than to the failure
     found = run_cells([TAPPED], method="adams", t_end=40.0)
     assert (int(found.status[0]), int(found.step_rule[0])) == (TIME_LIMIT, REPEAT)
     expected = adaptive.spin(columns(**TAPPED), 40.0, "DOP853")
@@ -90,7 +90,7 @@ def test_a_false_failure_is_passed_however_long_the_whole_run_would_be(monkeypat
 def test_no_repeat_takes_too_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """A failure that is confirmed on the way of a long run is still one; a false one stays unresolved."""
     expected = run_cells(ENDS.values(), method="dopri5", t_end=50.0)
-    monkeypatch.setattr(failures, "MOST_STEPS", 1.0)
+    monkeypatch.setattr(life, "MOST_STEPS", 1.0)
     found = run_cells(ENDS.values(), method="dopri5", t_end=5000.0)
     assert found.status.values.tolist() == list(ENDS)
     np.testing.assert_allclose(found.t_stop, expected.t_stop, rtol=0, atol=1e-6)
@@ -100,10 +100,12 @@ def test_no_repeat_takes_too_many_steps(monkeypatch: pytest.MonkeyPatch) -> None
     assert float(false.t_stop[0]) < 100.0
 
 
-def test_without_a_second_look_both_would_be_paradoxes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(failures, "look_at", lambda lives, rows: rows)  # noqa: ARG005
-    found = run_cells([THIN, STIFF], method="adams", t_end=14.5)
-    assert found.status.values.tolist() == [PARADOX, PARADOX]
+def test_their_first_runs_alone_are_paradoxes() -> None:
+    cells = {name: [THIN[name], (STANDARD | STIFF)[name]] for name in THIN}
+    scene = {"name": "once", "cases": cells, "start": {"x0": 0.01, "y0": 0.01}}
+    (part,) = plan(load_config(scene, {"method": "adams", "t_end": 14.5})).parts
+    execute(part.kernel, part.rows)
+    assert part.status.tolist() == [PARADOX, PARADOX]
 
 
 def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,8 +131,8 @@ def test_a_failure_is_approached_beyond_where_the_cell_settled_first(monkeypatch
         begun.append(states[:, 0])
         return np.full(1, PARADOX), stretch, *np.zeros((2, 1))
 
-    lives = begin([part])
-    kernel, rows = part.kernel, lives[0].cells.rows
+    lives = Lives(part)
+    kernel, rows = part.kernel, lives.rows
     table = kernel.table(rows)
     execute(kernel, rows)
     assert table["status"] == SETTLED
@@ -142,7 +144,7 @@ def test_a_failure_is_approached_beyond_where_the_cell_settled_first(monkeypatch
         reached.append(kernel.model_states(rows)[:, 0].copy())
     table["status"] = PARADOX
     monkeypatch.setattr(failures, "approach", approach)
-    live(lives)
+    live([lives])
     np.testing.assert_array_equal(begun[0], reached[0])
 
 
@@ -190,11 +192,11 @@ def test_tiles_and_threads_do_not_touch_the_numbers(monkeypatch: pytest.MonkeyPa
 def test_an_interrupt_while_cells_are_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"method": "adams", "t_end": 5.0}
     whole, heard, out, plain = run_cells(MIXED, **settings), Heard(), tmp_path / "out", Lives.enter
-    for wanted in (APPROACH, COMPANION):
+    for wanted in (Approach, Second):
 
-        def enter(lives: Lives, rows: np.ndarray, stage: int, *rest: Any, wanted: int = wanted, **more: Any) -> None:
-            plain(lives, rows, stage, *rest, **more)
-            if stage == wanted and len(rows):
+        def enter(lives: Lives, which: np.ndarray, to: Next, wanted: type[Any] = wanted) -> None:
+            plain(lives, which, to)
+            if isinstance(to, wanted) and len(which):
                 heard.act = interrupt
 
         monkeypatch.setattr(Lives, "enter", enter)

@@ -14,8 +14,8 @@ from support.runs import in_sittings, same_numbers
 
 import sweep
 from sweep.config import load_config
-from sweep.engine import executor, life
-from sweep.engine.cells import COMPANION, RUN, Lives
+from sweep.engine import executor, life, local
+from sweep.engine.lives import RUN, SECOND, Lives
 from sweep.engine.plan import plan
 from sweep.kernels import methods
 from sweep.kernels.kernel import Kernel
@@ -88,7 +88,7 @@ def test_the_images_of_a_batch_go_with_it(monkeypatch: pytest.MonkeyPatch, write
             super().__init__(*given)
             made.append(weakref.ref(self))
 
-    monkeypatch.setattr(life, "Lives", Watched)
+    monkeypatch.setattr(local, "Lives", Watched)
     gc.disable()
     try:
         sweep.run(write(), t_end=20)
@@ -146,19 +146,20 @@ MAP = {
 }
 
 
-def test_progress_counts_the_work_of_cells_whose_companions_run_beside_first_runs_of_others(
+def test_progress_counts_the_work_of_cells_whose_second_runs_run_beside_first_runs_of_others(
     counted: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bar that is at 60 % has 60 % of the steps behind it, once enough runs have ended to guess the others by."""
     monkeypatch.setattr("sweep.engine.executor._rescale", lambda *_: 100)  # chunks that do not depend on the machine
-    (each,), shares, beside = life.begin(plan(load_config(MAP)).parts), list[tuple[float, float]](), list[bool]()
+    (part,) = plan(load_config(MAP)).parts
+    each, shares, beside = Lives(part), list[tuple[float, float]](), list[bool]()
 
-    def look() -> None:
+    def check() -> None:
         shares.append((sum(counted), life.progress([each])[0] / 64))
-        beside.append(bool((each.stage == RUN).any() and (each.stage == COMPANION).any()))
+        beside.append(bool((each.stage == RUN).any() and (each.stage == SECOND).any()))
 
     with threads(1):
-        life.live([each], look)
+        life.live([each], check)
     work, reported = np.array(shares).T
     work /= sum(counted)
     assert len(work) > 20

@@ -8,7 +8,7 @@ from support.runs import run_cells
 import sweep
 from sweep.config import load_config
 from sweep.engine import executor
-from sweep.engine.ending import whole_blocks
+from sweep.engine.over import whole_blocks
 from sweep.engine.plan import plan
 from sweep.kernels.status import RUNNING
 from sweep.models.ladder import slip

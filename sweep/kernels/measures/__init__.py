@@ -8,25 +8,25 @@ from sweep.kernels.measures.decay import Decay
 from sweep.kernels.measures.energy import EnergyError
 from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.measures.margin import Margin
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Kind, Measurement
 from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import RestingSpin
 from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
 from sweep.models.model import Model, Tier
 
-_KINDS: tuple[type[Measurement], ...] = (
+_KINDS: tuple[type[Kind], ...] = (
     Reversals, EnergyError, Margin, RestingSpin, ReversalTimes, Estimate,
 )  # fmt: skip
 
-MEASURES: dict[str, type[Measurement]] = {kind.name: kind for kind in _KINDS}
+MEASURES: dict[str, type[Kind]] = {kind.name: kind for kind in _KINDS}
 """The measurements that a configuration can ask for."""
 
 OF_COUNTS: tuple[type[Measurement], ...] = (RoundOff, Decay)
 """The measurements without which a count and its error cannot be judged."""
 
 
-def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
+def chosen(specs: Iterable[str]) -> tuple[Kind, ...]:
     """The measurements for specs such as "reversals" or "reversal_times=12", in the order of `MEASURES`."""
     settings = {name: value for name, _, value in (spec.partition("=") for spec in specs)}
     found = {name: kind for name, kind in MEASURES.items() if name in settings}
@@ -36,7 +36,7 @@ def chosen(specs: Iterable[str]) -> tuple[Measurement, ...]:
     )
 
 
-def complete(measurements: tuple[Measurement, ...], tier: Tier) -> tuple[Measurement, ...]:
+def complete(measurements: tuple[Kind, ...], tier: Tier) -> tuple[Kind, ...]:
     """Add to `measurements` those that belong to every count of a model with two rocking modes."""
     counted = Reversals.name in {each.name for each in measurements}
     return (*measurements, *(kind() for kind in OF_COUNTS if counted and kind.asks in tier.offers))

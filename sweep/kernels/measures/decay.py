@@ -1,8 +1,6 @@
-"""Predict the effect of the rattle of a trajectory on its spin, so that a run can end early.
+"""Watch circular rattles, as in nearly round bodies, so that a run can end early: no slow equations hold for them.
 
-It cannot be requested: every kernel that counts the reversals of a model with two rocking modes has it.  It keeps the
-prediction of the slow equations for a state (`resting_spin.endings`), so that they are solved once.  It also watches
-circular rattles, as in nearly round bodies, for which there are no such equations.
+It cannot be requested: every kernel that counts the reversals of a model with two rocking modes has it.
 
 At regular checks it takes M·u/J33, to which the spin tends while the rattle decays (`sweep.models.stiff.precession`),
 and finds the slope with which that changes with the energy, by least squares over all checks of a window (Welford 1962,
@@ -49,16 +47,13 @@ _WINDOW = ("checks", "first_spin", "first_total", "mean_spin", "mean_total", "su
 the first check and on average; the sum of the squares of the latter's deviations from its average, and that of the
 products."""
 
-PREDICTED = ("predicted_at", "predicted_spin", "predicted_reversals", "predicted_overshoot", "predicted_nearest")
-"""One more than the step at which an ending was predicted, 0 if none was, and the ending (`final_spin.Ending`)."""
-
 
 class Decay(Measurement):
     name = "decay"
     summary = "effect of the rattle on the spin after the run"
     asks = Offer.MODES
     needs = ("reversals",)
-    quantities = (NEXT, EVERY, WOUND, LEFT, *_WINDOW, *PREDICTED)
+    quantities = (NEXT, EVERY, WOUND, LEFT, *_WINDOW)
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         return {NEXT: float("inf")}

@@ -13,6 +13,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.model import Array, Offer
+from sweep.models.stiff.final_spin import Ending
 from sweep.units import NUMBER
 
 
@@ -55,6 +56,6 @@ class EnergyError(Measurement):
     def skip(self, table: Table, stretch: Stretch) -> None:
         table["work"] += stretch.work
 
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+    def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
         start, violation = table["energy_start"], table["violation"]
         return {"energy_error": np.divide(violation, start, out=violation.copy(), where=start > 0)}

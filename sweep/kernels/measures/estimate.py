@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sweep.kernels.measures.measurement import Measurement
+from sweep.kernels.measures.measurement import Kind
 from sweep.models.model import Offer
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
 
-class Estimate(Measurement):
+class Estimate(Kind):
     """Predict the count; nothing is measured in the kernel."""
 
     name = "estimate"

@@ -20,9 +20,10 @@ from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.measurement import Measurement, measured
-from sweep.kernels.measures.resting_spin import endings, ends_as_predicted
+from sweep.kernels.measures.resting_spin import ends_as_predicted, only
 from sweep.kernels.status import SETTLED
 from sweep.models.model import Array, Offer
+from sweep.models.stiff.final_spin import Ending
 from sweep.units import SPIN
 
 EXTREMES = ("overshoot", "nearest_approach")
@@ -84,8 +85,8 @@ class Margin(Measurement):
 
         return check
 
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        arc = last_arc(table, ends_as_predicted(table))
+    def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
+        arc = last_arc(table, only(ends_as_predicted(table, left), left))
         nearest = arc.nearest_approach
         if WOUND in table.layout:
             nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
@@ -104,13 +105,13 @@ class LastArc(NamedTuple):
     nearest_approach: Array
 
 
-def last_arc(table: Table, predicted: Array) -> LastArc:
-    """Find the last arcs of the spins: as recorded, and where `predicted`, as the slow equations continue them.
+def last_arc(table: Table, left: Ending) -> LastArc:
+    """Find the last arcs of the spins: as recorded, and as the slow equations continue them, which is what is `left`.
 
     Where these do not apply, the spin hardly changes any more.
     """
-    left = endings(table, predicted)
-    overshoot, nearest = (table[name] if name in table.layout else np.full(len(predicted), np.nan) for name in EXTREMES)
+    unknown = np.full(len(table.rows), np.nan)
+    overshoot, nearest = (table[name] if name in table.layout else unknown for name in EXTREMES)
     further = (left.reversals > 0) | (left.overshoot > overshoot)
     return LastArc(
         table["reversals"] + np.nan_to_num(left.reversals),

@@ -1,8 +1,8 @@
 """Define what a measurement is, and explain how to add one.
 
-Subclass `Measurement` in a file of its own and enter the class in `MEASURES` of `sweep.kernels.measures`.  The
-configuration, the kernels of all methods, the dataset and the plots then include it.  `energy_error` is a short
-example.
+Subclass `Measurement` in a file of its own, or `Kind` for what is found after the run alone, and enter the class in
+`MEASURES` of `sweep.kernels.measures`.  The configuration, the kernels of all methods, the dataset and the plots then
+include it.  `energy_error` is a short example.
 
 A measurement keeps its numbers in quantities of its own in each state row, named by `quantities`.  It fills and reads
 them in hooks, all of which are optional:
@@ -37,6 +37,7 @@ from typing import ClassVar, NamedTuple
 
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model, Offer
+from sweep.models.stiff.final_spin import Ending
 from sweep.units import Unit
 from sweep.variables import Variable
 
@@ -99,8 +100,8 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class Measurement:
-    """A measurement that a configuration can ask for."""
+class Kind:
+    """Something that a configuration can ask for: what is found about a trajectory after its run."""
 
     name: ClassVar[str]
     """As in the configuration."""
@@ -113,20 +114,11 @@ class Measurement:
     implements `make_at_reversal` needs "reversals"."""
     by_default: ClassVar[bool] = False
     """Whether it is made by default, if the model supports it."""
-    work: ClassVar[bool] = False
-    """Whether it needs the work of friction in each step, which is computed only on request."""
-    ripple: ClassVar[bool] = False
-    """Whether it needs the ripple-free spin in each step, likewise."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     bounds: ClassVar[tuple[int, int] | None] = None
     """Smallest and largest value of its setting, an integer, which is then the only field of the class, a dataclass;
     None if it has no setting."""
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Names of the quantities that it adds to a state row.  They start at zero, except those that `start` sets."""
-        return ()
 
     @property
     def spec(self) -> str:
@@ -138,12 +130,37 @@ class Measurement:
         """Time of a run with it, relative to one without (`scripts/LOG.md`: `run_costs`); 1 if it hardly shows."""
         return 1.0
 
+    def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
+        """Return the values of the variables, by name, by default none.
+
+        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.
+
+        Parameters
+        ----------
+        table : state rows of trajectories that have ended
+        times : when they ended, shape (cells,)
+        left : what is left to come of their spins, by the slow equations
+        """
+        return {}
+
+    def doubts(self, table: Table) -> Array | int:
+        """Bits of `sweep.kernels.status.Doubt`: what it has against the results of the trajectories, shape (cells,)."""
+        return 0
+
+
+@dataclass(frozen=True)
+class Measurement(Kind):
+    """What is measured in the kernel, while a trajectory runs."""
+
+    work: ClassVar[bool] = False
+    """Whether it needs the work of friction in each step, which is computed only on request."""
+    ripple: ClassVar[bool] = False
+    """Whether it needs the ripple-free spin in each step, likewise."""
+
     @property
-    def in_kernel(self) -> bool:
-        """Whether it changes the kernel, by a quantity or by a hook in the loop."""
-        hooks = ("make_step", "make_at_reversal", "make_may_settle", "make_settled", "make_check")
-        own = any(getattr(type(self), hook) is not getattr(Measurement, hook) for hook in hooks)
-        return bool(self.quantities or own or self.work or self.ripple)
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities that it adds to a state row.  They start at zero, except those that `start` sets."""
+        return ()
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
         """Values of the quantities that do not start at zero, by name: of shape (cells,), or one number for all.
@@ -199,14 +216,6 @@ class Measurement:
         `rows` is a mask over the rows of `table`, shape (cells,).
         """
 
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        """Values of the variables, by name, from the rows of trajectories that ended at `times`, shape (cells,).
-
-        Each is of shape (cells,), or (cells, length) for a variable `along` a further dimension.  By default they are
-        the quantities of the same names.
-        """
+    def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
+        """As of `Kind`; by default the quantities of the same names."""
         return {name: table[name] for name in self.variables if name in self.quantities}
-
-    def doubts(self, table: Table) -> Array | int:
-        """Bits of `sweep.kernels.status.Doubt`: what it has against the results of the trajectories, shape (cells,)."""
-        return 0

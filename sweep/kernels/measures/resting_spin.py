@@ -16,8 +16,7 @@ import numpy as np
 
 from sweep.jit import on_all_threads
 from sweep.kernels.layout import Table, constants_of
-from sweep.kernels.measures.decay import PREDICTED
-from sweep.kernels.measures.measurement import Measurement, measured
+from sweep.kernels.measures.measurement import Kind, measured
 from sweep.kernels.status import SETTLED
 from sweep.models.model import Array, Offer, stack
 from sweep.models.stiff.final_spin import Ending, ending
@@ -29,7 +28,7 @@ _AT_A_TIME = 512
 """Number of cells whose ends one thread finds together; each needs 30 kB meanwhile."""
 
 
-class RestingSpin(Measurement):
+class RestingSpin(Kind):
     name = "resting_spin"
     summary = "final spin of a settled trajectory"
     asks = Offer.MODES
@@ -42,36 +41,30 @@ class RestingSpin(Measurement):
         )
     }  # fmt: skip
 
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
-        return {"spin_rest": endings(table, ends_as_predicted(table)).spin}
+    def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
+        return {"spin_rest": only(ends_as_predicted(table, left), left).spin}
 
 
-def ends_as_predicted(table: Table) -> Array:
+def ends_as_predicted(table: Table, left: Ending) -> Array:
     """Return which trajectories have settled as the slow equations predict, shape (cells,).
 
     A nearly round body may settle because it was watched (`decay`); if the slow equations then predict a reversal, they
     do not hold for it.
     """
-    settled = table["status"] == SETTLED
-    return np.asarray(settled & (endings(table, settled).reversals == 0))
+    return np.asarray((table["status"] == SETTLED) & (left.reversals == 0))
+
+
+def only(which: Array, left: Ending) -> Ending:
+    """Return the endings of a mask of trajectories, NaN for the others."""
+    return Ending(*(np.where(which, values, np.nan) for values in left))
 
 
 def endings(table: Table, which: Array) -> Ending:
-    """Find how the trajectories of a mask end under their rattle alone; arrays over all cells, NaN where unknown.
-
-    If the table has a place for it, it keeps the prediction for a state.
-    """
-    result, keeps = Ending(*np.full((4, len(table.rows)), np.nan)), PREDICTED[0] in table.layout
-    model = table.layout.model
+    """Find how the trajectories of a mask end under their rattle alone; arrays over all cells, NaN where unknown."""
+    result, model = Ending(*np.full((4, len(table.rows)), np.nan)), table.layout.model
     if model is None or Offer.ENDING not in model.offers:
         return result
-    new = which & np.isfinite(table.columns(model.states)).all(axis=1)
-    if keeps:
-        kept = new & (table[PREDICTED[0]] == table["done"] + 1)
-        new &= ~kept
-        for whole, name in zip(result, PREDICTED[1:], strict=True):
-            whole[kept] = table[name][kept]
-    cells = np.flatnonzero(new)
+    cells = np.flatnonzero(which & np.isfinite(table.columns(model.states)).all(axis=1))
 
     def find(first: int) -> None:
         some = cells[first : first + _AT_A_TIME]
@@ -80,9 +73,6 @@ def endings(table: Table, which: Array) -> Ending:
             whole[some] = part
 
     on_all_threads(find, range(0, len(cells), _AT_A_TIME))
-    if keeps:
-        for name, values in zip(PREDICTED, (table["done"] + 1, *result), strict=True):
-            table[name][cells] = values[cells]
     return result
 
 

@@ -23,6 +23,7 @@ from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.kernels.status import Doubt
 from sweep.models.model import Array, Columns, Model, Offer
+from sweep.models.stiff.final_spin import Ending
 from sweep.units import NUMBER, SPIN, TIME
 
 
@@ -121,7 +122,7 @@ class Reversals(Measurement):
         table["shifted"] = (table["shifted"] + closings) % 2
         table["phase"] = rest
 
-    def read(self, table: Table, times: Array) -> Mapping[str, Array]:
+    def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
         closed = times >= table["period"]
         return {
             "reversals": table["reversals"],

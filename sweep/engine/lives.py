@@ -1,0 +1,194 @@
+"""Keeps what is known of each cell of a batch, and lets cells enter their next stages.
+
+A cell has one state row that runs, or waits for a lane. In addition it may have the row of the run before, while a
+failure is being examined, and a row that is set aside while another one runs in its place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from sweep.engine import over
+from sweep.engine.cells import Cells
+from sweep.engine.errors import Errors
+from sweep.engine.failures import AHEAD, Met
+from sweep.grid import Array
+from sweep.kernels.layout import Table
+from sweep.kernels.method import REPEAT
+from sweep.kernels.status import QUIET, RUNNING
+from sweep.models.stiff.final_spin import Ending
+
+RUN, APPROACH, SECOND, DONE = range(4)
+"""Stages of a cell: it runs to its end; it runs to a few steps ahead of a failure, which is set aside; it runs a second
+time, and the first run is set aside; everything is known."""
+
+FIRST, LATER = range(2)
+"""Legs of a run: to `Rules.first_leg`, and to `t_end`."""
+
+NOTES = np.dtype([
+    ("stage", float), ("leg", float), ("step", float), ("step_rule", float),
+    ("halvings", float), ("step_before", float), ("met", [(name, float) for name in Met._fields]),
+    ("repeats", float), ("most_error", float), ("missed", bool), ("error", [(name, float) for name in Errors._fields]),
+    ("left", [(name, float) for name in Ending._fields]),
+])  # fmt: skip
+"""What is noted of each cell: its stage and leg; its step, and what determined it (`STEP_RULES`); how often the step
+was halved because of a failure, the step before, and what the last run met; how often the cell was repeated because of
+its error, the largest error with which another repeat is of use, and whether it misses its tolerance; its error; and
+what was left to come of its spin when the run stopped."""
+
+
+class Run(NamedTuple):
+    """Run on from the present state."""
+
+    settles: bool
+    """Whether it may settle, and goes on to t_end; otherwise it goes to the end of the same leg."""
+
+
+class Approach(NamedTuple):
+    """Run again, from the start to a few steps ahead of the failure."""
+
+
+class Second(NamedTuple):
+    """Run a second time, from the start, to estimate the error of the run."""
+
+    step: Array
+    t_end: Array
+    settles: Array
+    """Whether it may settle before t_end."""
+
+
+class Repeat(NamedTuple):
+    """Begin anew with another step."""
+
+    step: Array
+
+
+class Done(NamedTuple):
+    """Stay as it is."""
+
+
+Next = Run | Approach | Second | Repeat | Done
+
+
+def note(notes: Array, name: str, which: Array, record: Met | Errors | Ending) -> None:
+    """Set a nested record of the notes of the cells `which` to the arrays of `record`."""
+    for field, values in zip(record._fields, record, strict=True):
+        notes[name][field][which] = values
+
+
+class Lives:
+    """The cells of one method, and the progress of each.
+
+    Attributes
+    ----------
+    cells : as they began
+    rows : the state rows that run, shape (cells, quantities)
+    notes : of the type `NOTES`, shape (cells,)
+    before : state rows of the previous runs, shape (cells, quantities)
+    aside : state rows that are set aside, shape (cells, quantities)
+    """
+
+    def __init__(self, cells: Cells) -> None:
+        self.cells, self.rows, self.notes = cells, np.empty_like(cells.rows), np.zeros(len(cells.cells), NOTES)
+        self.notes["step"], self.notes["step_rule"] = cells.step, cells.step_rule
+        every = np.arange(len(self.notes))
+        note(self.notes, "error", every, Errors(*np.full((len(Errors._fields), len(every)), np.nan)))
+        self.notes["most_error"] = np.inf
+        # Pages that are never written take no memory.
+        self.before, self.aside = np.zeros_like(self.rows), np.zeros_like(self.rows)
+        self._begin(every, cells.rows.copy())
+
+    @property
+    def stage(self) -> Array:
+        return self.notes["stage"]
+
+    @property
+    def table(self) -> Table:
+        """Return the state rows that run, accessed by the names of their quantities."""
+        return self.cells.kernel.table(self.rows)
+
+    @property
+    def running(self) -> Array:
+        """Return the indices of cells that wait for steps."""
+        return np.flatnonzero((self.stage != DONE) & (self.table["status"] == RUNNING))
+
+    @property
+    def quiet(self) -> Array:
+        """Return the indices of cells that wait to continue without steps."""
+        return np.flatnonzero((self.stage != DONE) & (self.table["status"] == QUIET))
+
+    @property
+    def ended(self) -> Array:
+        """Return the indices of cells whose stage has ended."""
+        return np.flatnonzero((self.stage != DONE) & ~np.isin(self.table["status"], (RUNNING, QUIET)))
+
+    def take(self, which: Array | slice = slice(None), rows: Array | None = None) -> Cells:
+        """Return some cells with their present steps, and with copies of their state rows or of other `rows`."""
+        which = np.arange(len(self.notes))[which]
+        rows = (self.rows if rows is None else rows)[which]
+        step, rule = self.notes["step"][which], self.notes["step_rule"][which]
+        return replace(self.cells.take(which, rows), step=step, step_rule=rule)
+
+    def left(self, which: Array | slice = slice(None)) -> Ending:
+        """Return what was left to come of the spins of some cells when their runs stopped."""
+        return Ending(*(self.notes["left"][name][which] for name in Ending._fields))
+
+    def enter(self, which: Array, to: Next) -> None:
+        """Let the cells `which` enter their next stage."""
+        if not len(which):
+            return
+        match to:
+            case Run(settles):
+                table = self.take(which).table
+                table["status"], table["settles"] = RUNNING, settles
+                if settles:
+                    table["goal"], self.notes["leg"][which] = table["steps"], LATER
+                self.rows[which] = table.rows
+            case Approach():
+                goal = np.maximum(self.table["done"][which] - AHEAD, 0)
+                self._set_aside(which, APPROACH, self.take(which).start(), goal=goal)
+            case Second(step, t_end, settles):
+                self._set_aside(which, SECOND, self.take(which).start(step, t_end), settles=settles)
+            case Repeat(step):
+                self.notes["step"][which], self.notes["error"][which] = step, np.nan
+                if not self.cells.rules.fixed:
+                    self.notes["step_rule"][which] = REPEAT
+                self._begin(which, self.take(which).start())
+            case Done():
+                self.notes["stage"][which] = DONE
+
+    def _begin(self, which: Array, rows: Array) -> None:
+        """Let state rows at t = 0 run as first runs of the cells `which`."""
+        goal = over.first_goal(self.cells.take(which, rows))
+        self.notes["leg"][which] = FIRST
+        self._put(which, RUN, rows, settles=self.cells.rules.settles, goal=goal)
+
+    def _set_aside(
+        self, which: Array, stage: int, rows: Array, *, settles: Array | bool = False, goal: Array | float = np.inf
+    ) -> None:
+        self.aside[which] = self.rows[which]
+        self._put(which, stage, rows, settles=settles, goal=goal)
+
+    def _put(self, which: Array, stage: int, rows: Array, *, settles: Array | bool, goal: Array | float) -> None:
+        """Set state rows that run to their ends, or for `goal` steps."""
+        table = self.cells.kernel.table(rows)
+        table["settles"], table["goal"] = settles, np.minimum(table["steps"], goal)
+        self.rows[which], self.notes["stage"][which] = rows, stage
+
+    def saved(self) -> dict[str, Array]:
+        """Return everything that an interrupted batch needs to resume, by name."""
+        tables = {"rows": self.rows, "notes": self.notes}
+        tables |= {"before": self.before} if self.notes["halvings"].any() else {}
+        tables |= {"aside": self.aside} if np.isin(self.stage, (APPROACH, SECOND)).any() else {}
+        return {f"{self.cells.method} {name}": table for name, table in tables.items()}
+
+    def resume(self, saved: dict[str, Array]) -> None:
+        """Resume from what `saved` returned, if it is of these cells."""
+        own = {"rows": self.rows, "notes": self.notes, "before": self.before, "aside": self.aside}
+        found = {name: saved[key] for name in own if (key := f"{self.cells.method} {name}") in saved}
+        if all(name in found and found[name].shape == own[name].shape for name in ("rows", "notes")):
+            for name, table in found.items():
+                own[name][:] = table
