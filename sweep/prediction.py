@@ -17,7 +17,7 @@ from sweep.kernels.measures.reversals import Reversals
 from sweep.models.general import reversal_time
 from sweep.models.general.surfaces import ELLIPSOID
 from sweep.models.ladder import analytic, slip, slow
-from sweep.models.model import Columns, Model, Offer, Tier
+from sweep.models.model import Columns, Model, Offer, Tier, take
 from sweep.models.slow.estimate import estimate
 from sweep.models.theory import linear, stability
 from sweep.parameters import PAPER_PARAMETERS
@@ -37,8 +37,8 @@ class Prediction(NamedTuple):
     n_c1: Array
     """n_c1+ and n_c1- of the linear theory, shape (2, bodies): infinite where the rattle decays at every spin, and NaN
     where it does not decay at rest, or where that theory does not apply; empty for a tier that is not simulated."""
-    ranges: Array
-    """Ranges of spin in which the rattle decays, shape (7, cells), as `stability.stable_ranges` gives them."""
+    ranges: stability.StableRanges
+    """Ranges of spin in which the rattle decays, of each cell."""
 
 
 @np.errstate(divide="ignore", invalid="ignore", over="ignore")  # of the cells that the model does not fit
@@ -54,19 +54,19 @@ def predict(tier: Tier, grid: Grid, measure: Collection[str] = ()) -> Prediction
     if tier is slow.MODEL and Reversals.name in measure:
         found |= estimates(slip.MODEL, grid.columns())
     if not isinstance(tier, Model):
-        return Prediction(found, np.empty((2, 0)), np.empty((7, 0)))
+        return Prediction(found, np.empty((2, 0)), stability.StableRanges.none(0))
     bodies, place = grid.bodies()
-    ranges = (
-        _stable_ranges(tier, bodies.columns()) if Offer.LINEAR in tier.offers else np.full((7, bodies.size), np.nan)
-    )
-    n_c1 = ranges[1::-1]
+    ranges = stability.StableRanges.none(bodies.size)
+    if Offer.LINEAR in tier.offers:
+        ranges = _stable_ranges(tier, bodies.columns())
+    n_c1 = np.stack([ranges.high, ranges.low])
     if Offer.LINEAR in tier.offers or not tier.origin:
         found["n_c1_linear"] = np.where(np.isfinite(n_c1), n_c1, np.nan).T
     if Offer.REVERSAL_TIME in tier.offers and any(isinstance(each, ReversalTimes) for each in chosen(measure)):
         found["t_first_reversal_predicted"] = _first_reversal(tier, grid.columns(), n_c1[:, place])
     if Estimate.name in measure:
         found |= estimates(tier, grid.columns())
-    return Prediction(found, n_c1, ranges[:, place])
+    return Prediction(found, n_c1, take(ranges, place))
 
 
 def _first_reversal(model: Model, columns: Columns, n_c1: Array) -> Array:
@@ -78,7 +78,7 @@ def _first_reversal(model: Model, columns: Columns, n_c1: Array) -> Array:
     possible = np.flatnonzero(~model.impossible(columns))
     upper, lower = n_c1[:, possible] if "mu" in model.parameters else np.zeros((2, len(possible)))
     surface = model.variant.surface if model.variant else ELLIPSOID
-    theirs = {name: values[possible] for name, values in columns.items()}
+    theirs = take(columns, possible)
     time[possible] = reversal_time.first_reversal(theirs, (upper, lower), surface)
     return time
 
@@ -90,7 +90,7 @@ def estimates(model: Model, columns: Columns, *, check: bool = True) -> dict[str
     rounds = max(1, -(-size // (_SOME * threads())))
     together = max(1, -(-size // (rounds * threads())))
     parts = [slice(begin, begin + together) for begin in range(0, size, together)]
-    found = on_all_threads(lambda some: estimate(model, {k: v[some] for k, v in columns.items()}, check=check), parts)
+    found = on_all_threads(lambda some: estimate(model, take(columns, some), check=check), parts)
     return dict(zip(Estimate.variables, map(np.concatenate, zip(*found, strict=True)), strict=True))
 
 
@@ -112,9 +112,10 @@ def decay_times(model: Model, grid: Grid) -> Array:
     return np.asarray(np.nan_to_num(_in_parts(times, model, bodies.columns(), 1)[0])[place])
 
 
-def _stable_ranges(model: Model, columns: Columns) -> Array:
-    """Ranges of spin in which the rattle of bodies decays, shape (7, bodies); NaN for bodies that cannot be."""
-    return _in_parts(lambda some: stability.stable_ranges(model, some), model, columns, 7)
+def _stable_ranges(model: Model, columns: Columns) -> stability.StableRanges:
+    """Ranges of spin in which the rattle of bodies decays; NaN for bodies that cannot be."""
+    found = _in_parts(lambda some: np.stack(stability.stable_ranges(model, some)), model, columns, 7)
+    return stability.StableRanges(*found)
 
 
 def _in_parts(of: Callable[[Columns], Array], model: Model, columns: Columns, rows: int) -> Array:
@@ -123,7 +124,7 @@ def _in_parts(of: Callable[[Columns], Array], model: Model, columns: Columns, ro
     found, possible = np.full((rows, len(gone)), np.nan), np.flatnonzero(~gone)
     for begin in range(0, len(possible), _PART):
         some = possible[begin : begin + _PART]
-        found[:, some] = of({name: values[some] for name, values in columns.items()})
+        found[:, some] = of(take(columns, some))
     return found
 
 

@@ -11,6 +11,7 @@ from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import Table
 from sweep.kernels.status import FAILURES
 from sweep.models.model import Columns, Model, take
+from sweep.models.theory.stability import StableRanges
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,8 @@ class Cells:
     """The longest permitted step, in sqrt(c/g), shape (cells,)."""
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
-    stable: Array
-    """Ranges of spin in which the rattle decays, as `Kernel.start` takes them, shape (7, cells)."""
+    stable: StableRanges
+    """Ranges of spin in which the rattle decays."""
     rows: Array
     """State rows, shape (cells, quantities)."""
 
@@ -62,7 +63,7 @@ class Cells:
         columns: Columns,
         step: Array,
         step_rule: Array,
-        stable: Array,
+        stable: StableRanges,
     ) -> Cells:
         """Return cells with state rows at t = 0; the arguments are named as the attributes."""
         rows = _start(kernel, columns, step, rules.t_end, stable)
@@ -105,7 +106,7 @@ class Cells:
         """Return some of these cells, with their own state rows or with others."""
         return replace(
             self, cells=self.cells[which], columns=take(self.columns, which), step=self.step[which],
-            step_rule=self.step_rule[which], stable=self.stable[:, which],
+            step_rule=self.step_rule[which], stable=take(self.stable, which),
             rows=self.rows[which] if rows is None else rows,
         )  # fmt: skip
 
@@ -115,7 +116,7 @@ class Cells:
         return _start(self.kernel, self.columns, wanted, until, self.stable)
 
 
-def _start(kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: Array) -> Array:
+def _start(kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: StableRanges) -> Array:
     if not len(step):
         return np.empty((0, len(kernel.layout.names)))
     with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method

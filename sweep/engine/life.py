@@ -34,7 +34,7 @@ from sweep.engine.lives import (
     Run,
     Second,
     note,
-)
+)  # fmt: skip
 from sweep.grid import Array
 from sweep.kernels.kernel import FAILURE
 from sweep.kernels.layout import Table
@@ -130,24 +130,22 @@ def _judged(lives: Lives, which: Array, met: Met) -> Going:
         lives.rows[back], lives.notes["step"][back] = lives.before[back], lives.notes["step_before"][back]
     lives.notes["missed"][here] = doubtful[~again] & (not rules.fixed)
     table = lives.cells.kernel.table(lives.rows[here])
-    _set_failures(lives.cells, table, take(met, ~again), take(before, ~again), true[~again])
-    failed = np.isin(table["status"], FAILURES)
-    table["status"] = np.where(unsound[~again] & ~failed, DIVERGED, table["status"])
+    _set_outcome(lives.cells, table, take(met, ~again), take(before, ~again), true[~again], unsound[~again])
     lives.rows[here], lives.notes["halvings"][here], lives.notes["met"][here] = table.rows, 0, 0
     failed = np.isin(table["status"], FAILURES)
     yield here[failed], Done()
     yield from _run_twice(lives, here[~failed])
 
 
-def _set_failures(cells: Cells, table: Table, met: Met, before: Met, true: Array) -> None:
+def _set_outcome(cells: Cells, table: Table, met: Met, before: Met, true: Array, unsound: Array) -> None:
     """Set the final statuses of the rows in `table`, and the time of each failure and the spin at that time.
 
     A failure that is not `true` is an artefact of the integration. `before` holds what the runs with steps of twice the
     length have met.
     """
     error = np.maximum(np.abs(met.spin - before.spin) / (2**cells.kernel.stepper.error_order - 1), met.doubt)
-    failed = np.isin(table["status"], FAILURES)
-    table["status"] = np.where(true, met.kind, np.where(failed, DIVERGED, table["status"]))
+    false = np.isin(table["status"], FAILURES) | unsound
+    table["status"] = np.where(true, met.kind, np.where(false, DIVERGED, table["status"]))
     for name, values in zip(FAILURE, (met.time, met.spin, error), strict=True):
         table[name] = np.where(true, values, 0.0)
 

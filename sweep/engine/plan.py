@@ -20,6 +20,7 @@ from sweep.kernels.method import FIXED, Tolerance
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models.model import Columns, take
 from sweep.models.theory.linear import fastest_spin
+from sweep.models.theory.stability import StableRanges
 from sweep.prediction import Prediction, decay_times, predict
 
 TOLERANCE_TIME = 400.0
@@ -77,12 +78,13 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     chosen = choose(config, *grids)
     build(kernels(config, chosen), *also)
     predictions = tuple(on_all_threads(lambda grid: predict(config.equations, grid, config.measure), grids))
-    stable, how = np.concatenate([each.ranges for each in predictions], axis=1), config.integrator
+    stable = StableRanges(*np.concatenate([each.ranges for each in predictions], axis=1))
+    how = config.integrator
     fixed = how.step != "auto"
     rules = Rules(
         how.t_end, how.tolerance, how.first_leg, how.settles, fixed, how.estimate_errors, config.repeats and not fixed
     )
-    parts = tuple(Cells.at_start(config.equations, rules, *each, stable[:, each.cells]) for each in chosen)
+    parts = tuple(Cells.at_start(config.equations, rules, *each, take(stable, each.cells)) for each in chosen)
     return Plan(config, grids, predictions, parts)
 
 

@@ -20,7 +20,7 @@ from sweep.grid import Array
 from sweep.jit import all_threads
 from sweep.kernels import measures
 from sweep.kernels.status import IMPOSSIBLE, SETTLED
-from sweep.models.model import Offer
+from sweep.models.model import Offer, take
 from sweep.plots import labels
 from sweep.prediction import estimates
 
@@ -112,7 +112,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
 
     for spread in (_COARSE, 1):
         some = place[tuple(slice(None, None, spread) for _ in shape)]
-        theirs = {name: values[some.ravel()] for name, values in columns.items()}
+        theirs = take(columns, some.ravel())
         with all_threads():
             values = estimates(setup.config.equations, theirs, check=False)[COUNT].reshape(some.shape)
         found[place] = values[np.ix_(*(np.arange(n) // spread for n in shape))]
@@ -122,7 +122,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[possible[some] & ~simulated[some]]
         for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
-            theirs = {name: values[cells] for name, values in columns.items()}
+            theirs = take(columns, cells)
             with all_threads():
                 result = run(_of_cells(setup.config, theirs, tuple(axes)), reporter=job)
             found[cells], status[cells], simulated[cells] = result["reversals"], result["status"], True

@@ -21,6 +21,7 @@ from sweep.kernels.lanes import make_advance, make_check
 from sweep.kernels.layout import STABLE, Layout, Table, constants_of
 from sweep.kernels.measures.measurement import Kind, Measurement, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
+from sweep.models.theory.stability import StableRanges
 
 FAILURE = ("failed_at", "failed_spin", "failed_error")
 """Time of a failure, spin at that time, and its estimated error, which the engine finds (`sweep.engine.failures`); 0 if
@@ -207,7 +208,7 @@ class Kernel:
         """Return `rows`, accessed by the names of their quantities."""
         return Table(rows, self.layout)
 
-    def start(self, columns: Columns, step: Array, t_end: float | Array, stable: Array | None = None) -> Array:
+    def start(self, columns: Columns, step: Array, t_end: float | Array, stable: StableRanges | None = None) -> Array:
         """Return the state rows of trajectories at t = 0, shape (cells, quantities).
 
         Parameters
@@ -215,9 +216,7 @@ class Kernel:
         columns : physical parameters by name, each of shape (cells,)
         step : the longest step wanted, in sqrt(c/g), shape (cells,)
         t_end : time limit in sqrt(c/g), a number or of shape (cells,)
-        stable : lower and upper ends of the ranges of spin in which the rattle decays: about zero, the
-            next range below, and the next above, and the share in `STABLE`; shape (7, cells).  NaN where there is none;
-            by default there is none anywhere
+        stable : the ranges of spin in which the rattle decays; by default none are known
         """
         states, constants = stack(self.model.start(columns)), self.model.constants.of(columns)
         table = self.table(np.zeros((len(step), len(self.layout.names))))
@@ -225,7 +224,7 @@ class Kernel:
         table.set_columns(self.constants, stack(constants).T)
         spin, rattle, inertia = self.model.energy(states, constants)
         table["energy_start"] = table["energy"] = rattle + 0.5 * inertia * spin**2
-        table.set_columns(STABLE, np.nan if stable is None else stable.T)
+        table.set_columns(STABLE, np.nan if stable is None else np.stack(stable, axis=1))
         if self._ripples:
             table.set_columns(self._ripples, stack(self.model.ripple.of(columns)).T)
         for each in self.measurements:

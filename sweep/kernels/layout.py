@@ -12,6 +12,7 @@ from typing import Any
 
 from sweep.jit import INTERPRETED
 from sweep.models.model import Array, Model
+from sweep.models.theory.stability import StableRanges
 
 # Time per step and lane on one thread of a Zen 5 (slip model, AVX-512): 22.4 ns with 16 lanes, 24.2 ns with 8,
 # 24.4 ns with 32.  In plain Python idle lanes would cost as much as the others.
@@ -25,9 +26,8 @@ PACK = 1 if INTERPRETED else 8
 BLOCK = 128
 
 
-STABLE = ("stable_from", "stable_to", "below_from", "below_to", "above_from", "above_to", "stable_share")
-"""Ends of the ranges of spin in which the rattle decays: the range about zero, and the next below and above it; and the
-share of the first in which the rattle decays faster than a couple slows the spin."""
+STABLE = tuple(f"stable.{name}" for name in StableRanges._fields)
+"""The ranges of spin in which the rattle decays."""
 
 # A spin beyond n_c1 by less than this factor can reverse no more, although the rattle grows there.
 BEYOND = 1.5

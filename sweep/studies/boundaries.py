@@ -27,7 +27,7 @@ from sweep.engine.estimate import estimate
 from sweep.faults import fault_of
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED, TIME_LIMIT
-from sweep.models.model import Offer
+from sweep.models.model import Offer, take
 from sweep.prediction import estimates
 from sweep.results.dataset import variables
 from sweep.results.margins import POINTS, Counts
@@ -245,7 +245,7 @@ class Along(Boundaries):
         columns = {name: np.full(len(places), column[0]) for name, column in self.grid.columns().items()}
         columns |= {self.along.name: places}
         possible = ~self.config.equations.impossible(columns)
-        at, places, columns = at[possible], places[possible], {name: each[possible] for name, each in columns.items()}
+        at, places, columns = at[possible], places[possible], take(columns, possible)
         counts = estimates(self.config.equations, columns, check=False)["reversals_estimated"]
         ends = [0, *(np.flatnonzero(np.diff(counts)) + 1), len(at)]
         between = [(first + last) // 2 for first, last in pairwise(ends) if (at[first:last] % parts).all()]

@@ -20,6 +20,7 @@ from sweep.grid import Array
 from sweep.interrupt import point
 from sweep.kernels.methods import PLAIN, automatic_step
 from sweep.kernels.samples import sampled
+from sweep.models.model import take
 from sweep.studies.ranges import Range, mirrored
 
 UNKNOWNS = ("film_delay", "film_bias")
@@ -118,7 +119,7 @@ class Problem:
         model, columns = self.config.equations, self.columns(places)
         found, possible = np.full(len(places), np.inf), np.flatnonzero(~model.impossible(columns))
         if len(possible):
-            columns = {name: values[possible] for name, values in columns.items()}
+            columns = take(columns, possible)
             found[possible] = automatic_step(PLAIN, model, columns)[0]
         return found
 
@@ -130,7 +131,7 @@ class Problem:
         model, columns, found = self.config.equations, self.columns(places), self._found(places)
         self.trajectories += len(places)
         curves, possible = np.full((len(places), len(times)), np.nan), np.flatnonzero(~model.impossible(columns))
-        columns, found = ({name: v[possible] for name, v in each.items()} for each in (columns, found))
+        columns, found = (take(each, possible) for each in (columns, found))
         steps = automatic_step(PLAIN, model, columns)[0] if steps is None else steps[possible]
         longest = self.free["film_delay"].high if "film_delay" in self.free else 0.0
         shown = sampled(model, columns, steps, times, self.film.what, found.get("film_delay"), longest)

@@ -83,8 +83,8 @@ def test_a_false_failure_is_passed_however_long_the_whole_run_would_be(monkeypat
     monkeypatch.setattr(life, "MOST_STEPS", 8e3)  # fewer than twice those to t_end, more than to the failure
     found = run_cells([TAPPED], method="adams", t_end=40.0)
     assert (int(found.status[0]), int(found.step_rule[0])) == (TIME_LIMIT, REPEAT)
-    expected = adaptive.spin(columns(**TAPPED), 40.0, "DOP853")
-    assert float(found.spin_final[0]) == pytest.approx(expected, abs=3e-8)
+    off = abs(float(found.spin_final[0]) - adaptive.spin(columns(**TAPPED), 40.0, "DOP853"))
+    assert off < 10 * float(found.spin_error[0]) < 1e-3  # nor is it repeated because of its error
 
 
 def test_no_repeat_takes_too_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -120,7 +120,7 @@ def test_kernels_depend_on_what_the_file_says_not_on_where_it_lies(folder: Path)
 def test_the_process_that_compiles_gets_the_text_of_the_file(folder: Path) -> None:
     config = load_config(folder / "pendulum.yaml")
     (folder / "pendulum.py").unlink()
-    piece = ("approach", "dopri5", config.equations.key)
+    piece = ("failing", "dopri5", config.equations.key)
     with builder._start(piece, config.origin) as process:
         assert process.wait() == 0
     with builder._start(piece, replace(config.origin, text="1 / 0")) as process:

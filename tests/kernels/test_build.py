@@ -77,7 +77,7 @@ def test_estimated_counts_have_pieces_of_their_own(started: list[tuple[str, ...]
 
 
 def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
-    piece = ("approach", "dopri5", "slip")
+    piece = ("failing", "dopri5", "slip")
     run_cells([{}], t_end=10.0)
     assert piece not in started
     assert run_cells([ENDS[LIFT_OFF]], t_end=10.0).status == LIFT_OFF

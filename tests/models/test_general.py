@@ -243,7 +243,7 @@ def test_a_small_rattle_knows_only_the_curvatures() -> None:
                 [
                     linear.jacobian(model, model.constants.of(columns), np.array([3.0, -2.0])),
                     model.slower_period(columns),
-                    stability.stable_ranges(model, columns),
+                    np.stack(stability.stable_ranges(model, columns)),
                     np.array(model.ripple.of(columns)),
                     np.array(model.start(columns | near)),
                 ]

@@ -31,7 +31,7 @@ def test_no_range_of_spin_is_missed(name: str) -> None:
     """Whether the rattle grows, sampled finely in the spin, changes at the ends of the ranges and nowhere else."""
     body = wide_bodies(40)
     spins = np.geomspace(1e-6, 10, 800)
-    ranges = stability.stable_ranges(MODELS[name], body)
+    ranges = np.stack(stability.stable_ranges(MODELS[name], body))
     for sign, (end, near, far) in ((1, ranges[[1, 4, 5]]), (-1, -ranges[[0, 3, 2]])):
         for spin in spins:
             inner, outer, beyond = spin < end, (spin > near) & (spin < far), spin > np.where(np.isnan(far), 11, far)
@@ -82,7 +82,7 @@ def test_each_body_by_itself() -> None:
             found.append(predict(slip.MODEL, Grid({}, {}, bodies)).ranges)
     np.testing.assert_array_equal(found[0], found[1])
     some = {name: values[::7] for name, values in bodies.items()}
-    np.testing.assert_array_equal(found[0][:, ::7], stability.stable_ranges(slip.MODEL, some))
+    np.testing.assert_array_equal(np.stack(found[0])[:, ::7], stability.stable_ranges(slip.MODEL, some))
     assert np.isfinite(found[0][2:]).any()
 
 

@@ -17,6 +17,7 @@ a = 1.5 … 50, |δ| <= 0.5, μ = 0.1 … 5000) and took three times as long.
 from __future__ import annotations
 
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,8 +47,30 @@ def critical_spins(model: Model, columns: Columns) -> tuple[Array, Array]:
     return upper, lower
 
 
-def stable_ranges(model: Model, columns: Columns) -> Array:
+class StableRanges(NamedTuple):
     """Ranges of spin in which the rattle decays: the one about zero, the next below it, and the next above it.
+
+    Arrays of shape (cells,), in sqrt(g/c). An end is infinite where a range does not end within `SPIN_LIMIT`; NaN where
+    there is no such range.
+    """
+
+    low: Array
+    high: Array
+    below_low: Array
+    below_high: Array
+    above_low: Array
+    above_high: Array
+    share: Array
+    """The share of the range about zero in which the rattle decays faster than a couple slows the spin."""
+
+    @classmethod
+    def none(cls, cells: int) -> StableRanges:
+        """Return the ranges of cells whose rattle decays at no spin, as far as known."""
+        return cls(*np.full((len(cls._fields), cells), np.nan))
+
+
+def stable_ranges(model: Model, columns: Columns) -> StableRanges:
+    """Find the ranges of spin in which the rattle decays.
 
     Bodies have outer ranges where a fast spin detunes the two modes whose coupling feeds the rattle.
 
@@ -57,11 +80,8 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
 
     Returns
     -------
-    Shape (7, cells), as `Kernel.start` takes it: the lower and the upper end of each range, in sqrt(g/c), and the
-    share of the first within which the rattle decays faster than a couple slows the spin.  An end is infinite where a
-    range does not end within `SPIN_LIMIT`; NaN where there is no such range, and for all of a body whose rattle does
-    not decay at rest (no friction, or no dissipation in the model), or whose third axis is not an axis of inertia, so
-    that it cannot spin upright.
+    The ranges; NaN for a body whose rattle does not decay at rest (no friction, or no dissipation in the model), or
+    whose third axis is not an axis of inertia, so that it cannot spin upright.
 
     Raises
     ------
@@ -70,17 +90,18 @@ def stable_ranges(model: Model, columns: Columns) -> Array:
     """
     constants, limits = model.constants.of(columns), SPIN_LIMIT * model.spin_unit(columns)
     rest = np.zeros_like(constants[0])
-    ranges = np.full((7, len(rest)), np.nan)
+    ranges = StableRanges.none(len(rest))
     unit, growth = model.spin_unit(columns), growth_rate(model, constants, rest)
     cells = np.flatnonzero((growth < DECAYS) & _is_steady(model, constants, unit))
     if len(cells):
         constants = take(constants, cells)
-        ranges[6, cells] = _share_within(model, constants, unit[cells], -growth[cells])
+        ranges.share[cells] = _share_within(model, constants, unit[cells], -growth[cells])
         changes = _possible_changes(*_polynomial(model, constants))
-        for sign, rows in ((-1, (0, 3, 2)), (1, (1, 4, 5))):
+        below = ranges.low, ranges.below_high, ranges.below_low
+        for sign, theirs in ((-1, below), (1, (ranges.high, ranges.above_low, ranges.above_high))):
             ends = _ends(model, constants, sign * changes, sign, limits[cells])
-            for row, end in zip(rows, ends, strict=True):
-                ranges[row, cells] = sign * end
+            for values, end in zip(theirs, ends, strict=True):
+                values[cells] = sign * end
     return ranges
 
 
