@@ -36,10 +36,10 @@ class Rules:
 class Cells:
     """Cells that are run with one method."""
 
-    kernel: Kernel
     model: Model
     """The model in its users' variables; the kernel's model may have others."""
     rules: Rules
+    kernel: Kernel
     cells: Array
     """Indices among all cells of a batch, shape (cells,)."""
     columns: Columns
@@ -52,22 +52,6 @@ class Cells:
     """Ranges of spin in which the rattle decays."""
     rows: Array
     """State rows, shape (cells, quantities)."""
-
-    @classmethod
-    def at_start(
-        cls,
-        model: Model,
-        rules: Rules,
-        kernel: Kernel,
-        cells: Array,
-        columns: Columns,
-        step: Array,
-        step_rule: Array,
-        stable: StableRanges,
-    ) -> Cells:
-        """Return cells with state rows at t = 0; the arguments are named as the attributes."""
-        rows = _start(kernel, columns, step, rules.t_end, stable)
-        return cls(kernel, model, rules, cells, columns, step, step_rule, stable, rows)
 
     @property
     def method(self) -> str:
@@ -113,11 +97,4 @@ class Cells:
     def start(self, step: Array | None = None, t_end: float | Array | None = None) -> Array:
         """Return state rows of these cells at t = 0, with their own steps and time limit, or with others."""
         wanted, until = (self.step if step is None else step), (self.rules.t_end if t_end is None else t_end)
-        return _start(self.kernel, self.columns, wanted, until, self.stable)
-
-
-def _start(kernel: Kernel, columns: Columns, step: Array, t_end: float | Array, stable: StableRanges) -> Array:
-    if not len(step):
-        return np.empty((0, len(kernel.layout.names)))
-    with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method
-        return kernel.start(columns, step, t_end, stable)
+        return self.kernel.start(self.columns, wanted, until, self.stable)

@@ -149,9 +149,9 @@ class Lives:
                 self.rows[which] = table.rows
             case Approach():
                 goal = np.maximum(self.table["done"][which] - AHEAD, 0)
-                self._set_aside(which, APPROACH, self.take(which).start(), goal=goal)
+                self._run_again(which, APPROACH, self.take(which).start(), goal=goal)
             case Second(step, t_end, settles):
-                self._set_aside(which, SECOND, self.take(which).start(step, t_end), settles=settles)
+                self._run_again(which, SECOND, self.take(which).start(step, t_end), settles=settles)
             case Repeat(step):
                 self.notes["step"][which], self.notes["error"][which] = step, np.nan
                 if not self.cells.rules.fixed:
@@ -164,15 +164,16 @@ class Lives:
         """Let state rows at t = 0 run as first runs of the cells `which`."""
         goal = over.first_goal(self.cells.take(which, rows))
         self.notes["leg"][which] = FIRST
-        self._put(which, RUN, rows, settles=self.cells.rules.settles, goal=goal)
+        self._put(which, RUN, rows, self.cells.rules.settles, goal)
 
-    def _set_aside(
+    def _run_again(
         self, which: Array, stage: int, rows: Array, *, settles: Array | bool = False, goal: Array | float = np.inf
     ) -> None:
+        """Let state rows at t = 0 run in the place of others, which are set aside."""
         self.aside[which] = self.rows[which]
-        self._put(which, stage, rows, settles=settles, goal=goal)
+        self._put(which, stage, rows, settles, goal)
 
-    def _put(self, which: Array, stage: int, rows: Array, *, settles: Array | bool, goal: Array | float) -> None:
+    def _put(self, which: Array, stage: int, rows: Array, settles: Array | bool, goal: Array | float) -> None:
         """Set state rows that run to their ends, or for `goal` steps."""
         table = self.cells.kernel.table(rows)
         table["settles"], table["goal"] = settles, np.minimum(table["steps"], goal)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from sweep.engine.cells import Cells
 from sweep.engine.errors import Errors
 from sweep.engine.lives import Lives
 from sweep.engine.plan import Plan
@@ -19,39 +20,29 @@ CLEAR = 10.0
 times too small (docs/explanation/accuracy.md)."""
 
 
-def errors_of(lives: Lives) -> Errors:
-    """Return the errors of all cells, as far as known."""
-    errors, table = Errors(*(lives.notes["error"][name] for name in Errors._fields)), lives.table
-    spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
-    return errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin))
-
-
-def _simulated(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
-    """Collect the simulated variables by name, each over all cells."""
+def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
+    """Collect the simulated variables of `job` by name, over all cells, with accuracies where cells were run twice."""
     size = sum(grid.size for grid in job.grids)
-    arrays: dict[str, Array] = {}
+    arrays = {"status": np.full(size, IMPOSSIBLE)}
     for each in lives:
-        part = each.take()
-        found = dataset.measured(part.kernel, part.rows, part.rules.t_end, each.left())
-        found["step_rule"] = part.step_rule
+        found = _found(each)
         if job.config.integrator.method == AUTO:
-            found["method"] = np.full(len(part.cells), part.kernel.stepper.code)
+            found["method"] = np.full(len(each.rows), each.cells.kernel.stepper.code)
         for name, values in found.items():
             nothing = np.nan if dataset.VARIABLES[name].dtype.startswith("float") else 0
             blank = np.full((size, *values.shape[1:]), nothing)
-            arrays.setdefault(name, blank)[part.cells] = values
-    simulated = np.concatenate([part.cells for part in job.parts])
-    arrays["status"][np.delete(np.arange(size), simulated)] = IMPOSSIBLE
+            arrays.setdefault(name, blank)[each.cells.cells] = values
     return arrays
 
 
-def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
-    """Collect the simulated variables of `job` by name, over all cells, with accuracies where cells were run twice."""
-    found = _simulated(job, lives)
-    counted, twice = "reversals" in found, any(part.rules.twice for part in job.parts)
-    against = {Doubt.TIME_LIMIT: found["status"] == TIME_LIMIT} if counted else {}
-    if twice:
-        against |= _estimated(job, lives, found)
+def _found(lives: Lives) -> dict[str, Array]:
+    """Return the simulated variables of the cells of one method."""
+    cells = lives.take()
+    found = dataset.measured(cells.kernel, cells.rows, cells.rules.t_end, lives.left())
+    found["step_rule"] = cells.step_rule
+    against = {Doubt.TIME_LIMIT: found["status"] == TIME_LIMIT} if "reversals" in found else {}
+    if cells.rules.twice:
+        against |= _estimated(lives, cells, found)
     for bit, where in against.items():
         found["doubts"] |= bit * where
     sound = np.isin(found["status"], (SETTLED, TIME_LIMIT))
@@ -61,22 +52,19 @@ def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
     return found
 
 
-def _estimated(job: Plan, lives: Sequence[Lives], found: dict[str, Array]) -> dict[Doubt, Array]:
+def _estimated(lives: Lives, cells: Cells, found: dict[str, Array]) -> dict[Doubt, Array]:
     """Add the errors of cells that were run twice to `found`; return which cells they give reason to doubt."""
-    errors = Errors(*np.full((len(Errors._fields), len(found["status"])), np.nan))
-    missed = np.zeros(len(found["status"]), bool)
-    for each in lives:
-        for whole, part in zip(errors, errors_of(each), strict=True):
-            whole[each.cells.cells] = part
-        missed[each.cells.cells] = each.notes["missed"]
+    errors, table = Errors(*(lives.notes["error"][name] for name in Errors._fields)), cells.table
+    spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
+    errors = errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin))
     found["spin_error"] = np.where(found["doubts"] & Doubt.ROUND_OFF, np.nan, errors.reported)
-    against = {Doubt.TOLERANCE: missed}
+    against = {Doubt.TOLERANCE: lives.notes["missed"]}
     if "reversals" in found:
         against[Doubt.STEP] = errors.reversals != found["reversals"]  # a failed second run has the count NaN
     if "margin_more" in found:
-        clear = _clear(found, errors, slows=job.config.equations.slows)
+        clear = _clear(found, errors, slows=cells.model.slows)
         against[Doubt.MARGIN] = (found["status"] == SETTLED) & ~clear
-        against[Doubt.PARITY] = ~_consistent(job, found)
+        against[Doubt.PARITY] = ~_consistent(cells, found)
     return against
 
 
@@ -91,13 +79,9 @@ def _clear(found: Mapping[str, Array], errors: Errors, *, slows: bool) -> Array:
     return np.asarray(below & (found["margin_more"] > CLEAR * (errors.nearest_approach if slows else larger)))
 
 
-def _consistent(job: Plan, found: Mapping[str, Array]) -> Array:
+def _consistent(cells: Cells, found: Mapping[str, Array]) -> Array:
     """Return where the parity of the count matches the signs of the spin at start and end, shape (cells,)."""
-    consistent = np.zeros(len(found["reversals"]), bool)
-    for part in job.parts:
-        model = part.model
-        start, _, _ = model.energy(model.start(part.columns), model.constants.of(part.columns))
-        turned = start * found["spin_final"][part.cells]
-        odd = found["reversals"][part.cells] % 2 == 1
-        consistent[part.cells] = np.where(odd, turned <= 0, turned >= 0)
-    return consistent
+    model, columns = cells.model, cells.columns
+    start, _, _ = model.energy(model.start(columns), model.constants.of(columns))
+    turned = start * found["spin_final"]
+    return np.asarray(np.where(found["reversals"] % 2 == 1, turned <= 0, turned >= 0))

@@ -84,8 +84,12 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     rules = Rules(
         how.t_end, how.tolerance, how.first_leg, how.settles, fixed, how.estimate_errors, config.repeats and not fixed
     )
-    parts = tuple(Cells.at_start(config.equations, rules, *each, take(stable, each.cells)) for each in chosen)
-    return Plan(config, grids, predictions, parts)
+    parts = list[Cells]()
+    for each in chosen:
+        theirs = take(stable, each.cells)
+        rows = each.kernel.start(each.columns, each.step, how.t_end, theirs)
+        parts.append(Cells(config.equations, rules, *each, theirs, rows))
+    return Plan(config, grids, predictions, tuple(parts))
 
 
 def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:

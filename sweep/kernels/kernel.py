@@ -218,8 +218,10 @@ class Kernel:
         t_end : time limit in sqrt(c/g), a number or of shape (cells,)
         stable : the ranges of spin in which the rattle decays; by default none are known
         """
-        states, constants = stack(self.model.start(columns)), self.model.constants.of(columns)
         table = self.table(np.zeros((len(step), len(self.layout.names))))
+        if not len(step):
+            return table.rows
+        states, constants = stack(self.model.start(columns)), self.model.constants.of(columns)
         table.set_columns(self.model.states, states.T)
         table.set_columns(self.constants, stack(constants).T)
         spin, rattle, inertia = self.model.energy(states, constants)
@@ -230,7 +232,8 @@ class Kernel:
         for each in self.measurements:
             for name, values in each.start(self.model, columns, rattle).items():
                 table[name] = values
-        self.stepper.prepare(self, table, columns, step, t_end)
+        with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method
+            self.stepper.prepare(self, table, columns, step, t_end)
         return table.rows
 
     def advance(self, rows: Array, cells: Array, blocks: int, least: int | None = None) -> int:

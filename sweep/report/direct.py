@@ -85,13 +85,12 @@ def simulate(
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stable = predict(chosen, Grid({}, {}, dict(columns))).ranges
     steps = np.broadcast_to(steps, cells).astype(float)
-    rules = Rules(t_end, tolerance, settles=settle)
-    start = Cells.at_start(chosen, rules, kernel, np.arange(cells), columns, steps, np.zeros(cells), stable)
+    rows = kernel.start(columns, steps, t_end, stable)
     if decide:
-        lives = Lives(start)
+        rules = Rules(t_end, tolerance, settles=settle)
+        lives = Lives(Cells(chosen, rules, kernel, np.arange(cells), columns, steps, np.zeros(cells), stable, rows))
         live([lives])
         return Ends(kernel, lives.rows, t_end)
-    rows = start.rows
     kernel.table(rows)["settles"] = settle
     execute(kernel, rows)
     return Ends(kernel, rows, t_end)
