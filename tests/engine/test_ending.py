@@ -67,7 +67,7 @@ def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, tmp_path: Path) -
 
 @pytest.mark.campaign
 def test_a_run_that_settles_at_its_first_check_is_certain() -> None:
-    """Its companion, in longer steps, closes a single window before the same time."""
+    """Its second run, in longer steps, closes a single window before the same time."""
     found = sweep.run(ROOT / "configs" / "kane_levinson_viscous.yaml", mu=5.0, n0=0.5, method="adams")
     assert float(found.margin_more) == pytest.approx(0.5, rel=0.01)
     assert bool(found.certain)

@@ -75,7 +75,7 @@ def test_a_missed_tolerance_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_spins_alike_by_chance_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Here run and companion are both off by 5e-8, and their spins differ by 5e-9."""
+    """Here both runs are off by 5e-8, and their spins differ by 5e-9."""
     body = {"a": 13.0154, "b": 2.63841, "c": 1.3931, "delta": 0.438128}
     start = {"mu": 1063.93, "n0": 0.169982, "x0": 0.681233, "y0": -0.0524919}
     true = 0.049114303389740155  # Taylor series at 1e-16: `scripts/reference_wide.py`.
@@ -88,7 +88,7 @@ def test_spins_alike_by_chance_are_not_believed(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_an_error_is_not_far_below_what_is_to_be_expected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Here run and companion end at the same spin, and their rattles agree as well."""
+    """Here both runs end at the same spin, and their rattles agree as well."""
     # The spins are of dopri5 at a tolerance of 1e-12; adams is within 6e-13 of it.
     one = (4.72275, 2.97528, 1.58431, 0.474342, 0.15999, 0.00628562, -0.315556, -0.250348)
     other = (20.3576, 4.38664, 1.45305, 0.385207, 0.628137, 0.00519158, -0.64222, -0.0138771)
@@ -110,7 +110,7 @@ IN_NOISE = {"b": 1.6, "mu": 52.0, "n0": 0.1}
 
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
 def test_no_error_is_claimed_for_a_spin_that_round_off_decides(tolerance: float) -> None:
-    """Run and companion agree because both have the same floor."""
+    """Both runs agree because both have the same floor."""
     found = cells([IN_NOISE], method="adams", tolerance=tolerance, t_end=1827.0)
     assert abs(float(found.spin_final[0]) - 0.0386) > 0.01
     assert found.doubts[0].item() & Doubt.ROUND_OFF
@@ -120,7 +120,7 @@ def test_no_error_is_claimed_for_a_spin_that_round_off_decides(tolerance: float)
 
 
 def test_a_count_is_compared_where_the_spins_rest() -> None:
-    """At the end of the run that of the companion is still in mid-swing: its last reversal comes later."""
+    """At the end of the run that of the second run is still in mid-swing: its last reversal comes later."""
     found = sweep.run({"friction": {"mu": 76.0}, "body": {"b": 1.6}, "start": {"n0": 0.1}}, method="adams")
     assert (int(found.reversals), int(found.doubts & Doubt.STEP), int(found.certain)) == (5, 0, 1)
 

@@ -40,7 +40,7 @@ from sweep.models.theory.rocking import implicit
 # Steps of dopri5, in widths of the layer, and their number.  A step is at least half that long, unless the final one is
 # shorter.  Every second one of the last steps is a point of the history.  The slip has forgotten how it began
 # after a quarter of them, but while it has not, BDF5 would lose more accuracy in one step than dopri5 does in all of
-# them, and such an error hardly depends on the step, so no companion run reveals it.  With half as many, one of 278
+# them, and such an error hardly depends on the step, so no second run reveals it.  With half as many, one of 278
 # wide cells was off by more than 3 times a tolerance of 1e-10 without notice; with a quarter, hard taps left 5 to 20
 # times the error.
 _SHARE, _DOPRI5_STEPS = 0.5, 224
