@@ -50,6 +50,8 @@ class MapControls:
         for name, choice in self._choices.items():
             k = choice.of(state)
             self._widgets[name].value = k if choice.axis else choice.options[k]
+            if choice.axis:  # otherwise a slider that is moved back to its first value would change nothing here
+                self._widgets[name].set_from_json("value_throttled", k)
             self._widgets[name].visible = not choice.axis or name in along - {state.x, state.y}
         for name, field in self._limits.items():
             field.value = f"{state.limits[name]:.6g}" if name in state.limits else ""
@@ -190,6 +192,7 @@ class CellControls:
 
     def _row(self, k: int, activate: Callable[[int], None], remove: Callable[[int], None]) -> tuple[Row, Button]:
         border = f".bk-btn {{ border-left: 8px solid {CURVES[k]} !important; text-align: left }}"
+        border += ".bk-btn-primary { background-color: #0b62b8 !important }"
         button = Button(label="", sizing_mode="stretch_width", stylesheets=[border], name=f"cell {k + 1}")
         button.on_click(lambda: activate(k))
         away = Button(label="×", width=36, name=f"remove {k + 1}")

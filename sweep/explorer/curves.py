@@ -44,7 +44,7 @@ class Curves:
         self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
         self.spin.hspan("spin", source=self._critical, line_color=SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
-                       text_color=SOFT)  # fmt: skip
+                       text_color="#4a5560", name="symbols")  # fmt: skip
         self._played: tuple[Curve | None, float] | None = None
         self.player = Player([self.spin, self.energy])
 
@@ -66,7 +66,7 @@ class Curves:
             spins = theory.levels(chosen.dataset) if chosen else []
             self._critical.data = {
                 "spin": [at for _, _, at, _ in spins],
-                "time": [end * (0.93 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close
+                "time": [end * (0.85 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close
                 "dash": [theory.OVER_TIME[name] for name, *_ in spins],
                 "symbol": [sign for _, sign, *_ in spins],
             }

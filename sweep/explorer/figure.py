@@ -8,7 +8,9 @@ smoothly.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,12 +27,15 @@ from sweep.kernels.measures.reversals import Reversals
 from sweep.plots import labels, marks, places, theory
 from sweep.plots.description import Map, describe
 from sweep.plots.scales import Scale
+from sweep.plots.theory import Line
 
 HEIGHT = 480
 """Height of the map in pixels."""
 
 _CUT_HEIGHT = 150
 """Height of a cut in pixels."""
+
+STALE = "grey dots: lines of the dataset's body"
 
 LINES = {name: (dash, round(1.25 * width, 2)) for name, (dash, width) in theory.STYLES.items()}
 """Dashes of the lines over a map, and their widths in pixels."""
@@ -64,7 +69,9 @@ class MapFigure:
         over = {"image": [np.zeros((2, 2), "uint32")]} | {name: [at] for name, at in place.items()}
         overlay = ColumnDataSource(over, syncable=False)
         plot.image_rgba(image="image", x="x", y="y", dw="dw", dh="dh", source=overlay)
-        self._lines = {name: _line(plot, *style) for name, style in LINES.items()}
+        self._lines = {name: _line(plot, f"line {name}", *style) for name, style in LINES.items()}
+        self._stale = ColumnDataSource({"xs": [], "ys": []}, name="stale")
+        plot.multi_line("xs", "ys", source=self._stale, color="#c8ccd0", width=1.5, dash=[2, 6])
         self._numbers = _counts(plot)
         self._uncertain = plot.scatter([], [], color="white", line_color="black", line_width=0.7)
         # The browser writes the cell under the pointer to the first, and the cell to run to the second.
@@ -87,11 +94,11 @@ class MapFigure:
         """Show the variable of a state, or the first variable of `other`; return its map and its colour scale."""
         if other is None:
             part, known = self._source.map(state.show, *self.axes, state.at), self._source.cell
-            scale = style.scale_of(part, state)
+            scale = style.scale_of(part, state, self._source.extremes(state.show))
         else:
             part, known = describe(other, next(iter(map(str, other.data_vars))), *self.axes), other
-            counted = [Reversals.name] if Reversals.name in self._source.variables else []
-            scale = style.scale_of(part, state, *(self._source.map(name, *self.axes, state.at) for name in counted))
+            counted = Reversals.name in self._source.variables
+            scale = style.scale_of(part, state, self._source.extremes(Reversals.name) if counted else part.shown[:0])
         logarithmic = style.is_logarithmic(scale)
         for image in self._images:
             image.visible = (image is self._images[1]) == logarithmic
@@ -99,9 +106,15 @@ class MapFigure:
         mapper.update(**style.mapping(scale))
         kinds = np.packbits(np.stack(list(part.marks.values()), axis=-1), axis=-1, bitorder="little")
         self._cells.data = {"image": [plain(part.values)], "kinds": [kinds[..., 0]]}
+        stale = list[Line]()
+        if other is not None:
+            of_dataset = self._source.map(state.show, *self.axes, state.at).lines
+            kept = {line.name for line in of_dataset if theory.holds(line.name, state.changed)}
+            part.lines[:] = [line for line in of_dataset if line.name in kept]
+            stale = [line for line in of_dataset if line.name not in kept]
         for name, source in self._lines.items():
-            parts = [points for line in part.lines if line.name == name for points in line.parts]
-            source.data = {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
+            source.data = self._placed(line for line in part.lines if line.name == name)
+        self._stale.data = self._placed(stale)
         boundaries = [line for line in part.lines if line.name == "boundary"]
         numbers = list(places.words(boundaries, part.x, part.y))
         self._numbers.data = {
@@ -122,7 +135,12 @@ class MapFigure:
             # Bokeh looks through all models, in a third of a second, for each new one; frozen, it does so once.
             with document.models.freeze() if document else nullcontext():
                 self._explain(part, scale, unit, mapper)
-        return part, scale
+        return replace(part, notes=(*part.notes, STALE)) if stale else part, scale
+
+    def _placed(self, lines: Iterable[Line]) -> dict[str, list[Any]]:
+        """Return the parts of lines as columns for Bokeh."""
+        parts = [points for line in lines for points in line.parts]
+        return {"xs": [self._x.place(x) for x, _ in parts], "ys": [self._y.place(y) for _, y in parts]}
 
     def _explain(self, part: Map, scale: Scale, unit: str, mapper: Any) -> None:
         """Label the bar, the cuts and the tooltips for a scale."""
@@ -148,9 +166,9 @@ def _bar(unit: str, scale: Scale, mapper: Any) -> models.ColorBar:
     )  # fmt: skip
 
 
-def _line(plot: Any, dash: str, width: float) -> ColumnDataSource:
+def _line(plot: Any, name: str, dash: str, width: float) -> ColumnDataSource:
     """Add a line that is visible on every colour."""
-    source = ColumnDataSource({"xs": [], "ys": []})
+    source = ColumnDataSource({"xs": [], "ys": []}, name=name)
     plot.multi_line("xs", "ys", source=source, color="white", width=2.5 * width)
     plot.multi_line("xs", "ys", source=source, color="black", width=width, dash=dash)
     return source
@@ -174,11 +192,11 @@ def _cursor(plot: Any) -> ColumnDataSource:
 
 def _pins(plot: Any) -> ColumnDataSource:
     """The cells whose trajectories are drawn, each with its number."""
-    source = ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "alpha")}, name="pins")
+    source = ColumnDataSource({key: [] for key in ("x", "y", "colour", "number", "ink", "alpha")}, name="pins")
     plot.scatter(
         "x", "y", source=source, size=17, fill_color="colour", line_color="white", line_width=1.5, alpha="alpha"
     )
-    plot.text("x", "y", "number", source=source, text_color="white", text_font_size="11px", text_font_style="bold",
+    plot.text("x", "y", "number", source=source, text_color="ink", text_font_size="11px", text_font_style="bold",
               text_align="center", text_baseline="middle", alpha="alpha")  # fmt: skip
     return source
 

@@ -90,7 +90,9 @@ const sweep = (() => {
   /** Take note of the map that is shown; called for every new figure. */
   function use(map) {
     repaint(map)
+    if (current?.figure !== map.figure) requestAnimationFrame(zoom)
     current = map
+    keep()
     cut(...map.cut ?? chosen(map.cursor))
   }
 
@@ -146,6 +148,16 @@ const sweep = (() => {
     if (probe.data.i[0] !== i || probe.data.j[0] !== j) probe.data = {i: [i], j: [j]}
   }
 
+  /** Say to a screen reader the value and the place of a cell. */
+  function announce(i, j) {
+    const {cuts, cells, blank, figure, ex} = current
+    const k = j * (ex.length - 1) + i, value = cells.data.image[0][k]
+    const words = cuts[0].plot.left[0].major_label_overrides.get(value) ?? number(value)
+    const place = cuts.map(({symbol, values}, n) => `${symbol} = ${number(values[n ? j : i])}`).join(", ")
+    const known = !(cells.data.kinds[0][k] & blank) && Number.isFinite(value)
+    document.querySelector("#said").textContent = `${figure.title.text}: ${known ? words : "no value"}, at ${place}`
+  }
+
   const chosen = (cursor) => [cursor.data.i[0] ?? -1, cursor.data.j[0] ?? -1]
 
   const STEPS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}
@@ -161,6 +173,7 @@ const sweep = (() => {
       const next = i < 0 ? [0, 0] : [clamp(i + stride * di, ex), clamp(j + stride * dj, ey)]
       choose(...next)
       tell(probe, ...next)
+      announce(...next)
     } else if (event.key === "Enter" && i >= 0) {
       ask(request, i, j, event.shiftKey)
     } else {
@@ -217,6 +230,11 @@ const sweep = (() => {
     return data
   }
 
+  /** Play at once, if the page is to, unless the visitor prefers pages that rest. */
+  function begin({button}) {
+    button.active = Boolean(button.tags[0]) && !matchMedia("(prefers-reduced-motion: reduce)").matches
+  }
+
   function play(models, active) {
     cancelAnimationFrame(player)
     if (!active) return
@@ -239,7 +257,19 @@ const sweep = (() => {
   function theme(choice) {
     const wanted = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"
     document.documentElement.dataset.theme = choice ?? wanted
+    ink()
     for (const model of window.Bokeh?.documents[0]?.all_models ?? []) Bokeh.index.find_one(model)?.request_repaint?.()
+  }
+
+  /** Give letters that no style sheet reaches a colour that can be read. */
+  function ink() {
+    const colour = document.documentElement.dataset.theme === "dark" ? "#b8c2cb" : "#4a5560"
+    for (const model of window.Bokeh?.documents[0]?.all_models ?? []) {
+      const names = {ColorBar: ["major_label_text_color", "title_text_color"], Legend: ["label_text_color"]}[model.type]
+      const glyph = model.name === "symbols" ? model.glyph : null
+      for (const each of names ?? []) if (model[each] !== colour) model.setv({[each]: colour}, {sync: false})
+      if (glyph && glyph.text_color.value !== colour) glyph.setv({text_color: {value: colour}}, {sync: false})
+    }
   }
 
   function turn() {
@@ -249,10 +279,93 @@ const sweep = (() => {
   theme()
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => theme())
 
-  // ---- the address
+  // ---- the address: the server's query, and the part of the map that is shown
 
+  let shown = "", pushed = 0
+
+  /** Take note of the query; without cells, the page has no part for trajectories. */
+  function note(query) {
+    shown = query
+    document.documentElement.dataset.cells = query.includes("cell=") ? "some" : "none"
+  }
+
+  /** The part of the map that is shown, as the address has it: empty for the whole. */
+  function part() {
+    const spans = [current?.figure.x_range, current?.figure.y_range].filter(Boolean)
+    const whole = spans.every(({start, end, bounds: [low, high]}) => start === low && end === high)
+    return whole ? "" : `&zoom=${spans.flatMap(({start, end}) => [start, end]).map((at) => Number(at.toPrecision(6))).join(":")}`
+  }
+
+  /** Show the part of the map that the address names, or the whole map. */
+  function zoom() {
+    const asked = (new URLSearchParams(location.search).get("zoom") ?? "").split(":").map(Number)
+    const spans = [current.figure.x_range, current.figure.y_range]
+    const fits = asked.length === 4 && spans.every(({bounds: [low, high]}, n) =>
+      low <= asked[2 * n] && asked[2 * n] < asked[2 * n + 1] && asked[2 * n + 1] <= high)
+    spans.forEach((span, n) => {
+      const [start, end] = fits ? asked.slice(2 * n, 2 * n + 2) : span.bounds
+      span.setv({start, end})
+    })
+  }
+
+  let keeping = 0
+
+  /** Write the part of the map into the address, once it rests. */
+  function keep() {
+    clearTimeout(keeping)
+    keeping = setTimeout(() => history.replaceState(null, "", `?${shown}${part()}`), 300)
+  }
+
+  /** The page is opened at the server's query; the part of the map stays. */
+  function arrive(query) {
+    note(query)
+    const zoomed = new URLSearchParams(location.search).get("zoom")
+    history.replaceState(null, "", `?${query}${zoomed ? `&zoom=${encodeURIComponent(zoomed)}` : ""}`)
+  }
+
+  /** The visitor's choices have another address; Back undoes one, and what a moving slider does is one. */
   function address(query) {
-    history.replaceState(null, "", `?${query}`)
+    if (query === shown) return
+    const now = performance.now()
+    history[now - pushed < 700 ? "replaceState" : "pushState"](null, "", `?${query}${part()}`)
+    note(query)
+    pushed = now
+  }
+
+  /** Once the page is there: Back asks the server, through `wanted`, for what the earlier address names. */
+  function ready(wanted) {
+    addEventListener("popstate", () => {
+      note(location.search.slice(1).replace(/&zoom=[^&]*/, ""))
+      wanted.data = {query: [shown]}
+      requestAnimationFrame(zoom)
+    })
+    setInterval(() => { name(); ink() }, 500)
+  }
+
+  function ended(lost) {
+    document.querySelector("#ended").hidden = !lost
+  }
+
+  /** Give sliders and tools the names and values that a screen reader says; Bokeh gives them none. */
+  function name() {
+    for (const {model, el, shadow_el} of Bokeh.index.query((view) => view.shadow_el)) {
+      const handle = shadow_el.querySelector(".noUi-handle")
+      if (handle) {
+        handle.setAttribute("aria-label", model.title || model.name)
+        const [, value] = (shadow_el.querySelector(".bk-slider-title")?.textContent ?? "").split(": ")
+        if (value) handle.setAttribute("aria-valuetext", value)
+      } else if (shadow_el.querySelector(".bk-tool-icon")) {
+        el.setAttribute("role", "button")
+        el.setAttribute("aria-label", el.title)
+      }
+    }
+  }
+
+  /** Show all values of the cell, or five. */
+  function fold() {
+    const {dataset} = document.documentElement
+    if (dataset.rest) delete dataset.rest
+    else dataset.rest = "shown"
   }
 
   async function copy(button) {
@@ -264,5 +377,5 @@ const sweep = (() => {
 
   document.addEventListener("DOMContentLoaded", () => document.querySelector("#map")?.addEventListener("keydown", key))
 
-  return {address, copy, moment, number, play, point, tap, turn, use}
+  return {address, arrive, begin, copy, ended, fold, moment, number, play, point, ready, tap, turn, use}
 })()

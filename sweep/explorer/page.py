@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ def dress(document: Document, source: Source, query: str) -> None:
     document.template = _text("page.html")
     document.template_variables.update(
         css=_text("page.css"), js=_text("page.js"), query=query, heading=document.title,
-        constants=labels.constants(source.dataset),
+        constants=labels.constants(source.dataset), command=f"python -m sweep explore {shlex.quote(source.name)}",
     )  # fmt: skip
 
 
@@ -40,5 +41,5 @@ def legend(part: Map, scale: Scale) -> str:
     """The patterns and lines that occur in a map, and the values beyond its scale, as HTML."""
     items = [(style.swatch(kind), words) for kind, words in part.legend.items()]
     lines = {line.words: figure.LINES[line.name] for line in part.lines}
-    items += [(f"border-top:{2 * width}px {dash} currentColor", words) for words, (dash, width) in lines.items()]
-    return str(PARTS.legend(items, style.beyond(part, scale)))
+    items += [(style.line(dash, width), words) for words, (dash, width) in lines.items()]
+    return str(PARTS.legend(items, [*part.notes, *filter(None, [style.beyond(part, scale)])]))

@@ -59,16 +59,22 @@ class Player:
         trail = models.Select(title="trail", value="0.02", width=96, syncable=False, options=[
             ("0.002", "0.2 %"), ("0.02", "2 %"), ("0.2", "20 %"), ("1", "all")])  # fmt: skip
         parts |= {"slider": self._slider, "speed": speed, "button": button, "trail": trail}
-        self.moment = moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
-        """Draws the body at the time of the slider."""
+        moment = models.CustomJS(args={"models": parts}, code="sweep.moment(models)")
+        self._button = button
+        self.begin = models.CustomJS(args={"models": parts}, code="sweep.moment(models); sweep.begin(models)")
+        """Draws the body at the time of the slider, and plays it if it is to be played at once."""
         for model, change in (
             (self._slider, "value"), (self._slider, "end"), (trail, "value"), (self._motion, "data"),
         ):  # fmt: skip
             model.js_on_change(change, moment)
-        code = "cb_obj.label = cb_obj.active ? '⏸ Pause' : '▶ Play'; sweep.play(models, cb_obj.active)"
+        code = "cb_obj.label = cb_obj.active ? '❚❚ Pause' : '▶ Play'; sweep.play(models, cb_obj.active)"
         button.js_on_change("active", models.CustomJS(args={"models": parts}, code=code))
         row = models.Row(button, speed, trail, styles={"align-items": "end", "gap": "4px"})
         return models.Column(self._slider, row, sizing_mode="stretch_width", name="player", stylesheets=[WIDGETS])
+
+    def play_at_once(self, wanted: bool) -> None:
+        """Say whether the page begins to play when it is opened."""
+        self._button.tags = [wanted]
 
     def show(self, curve: Curve | None, colour: str, end: float) -> None:
         """Show the body of a curve, if its attitude and shape are known; the slider goes to the time `end`."""

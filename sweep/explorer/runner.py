@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -213,6 +213,14 @@ class Drawn:
             self.remove(0)
         self._jobs.append(self._begun(cell))
         self.active = len(self._jobs) - 1
+
+    def show(self, cells: Sequence[Cell]) -> None:
+        """Choose these cells; those that were chosen before keep their runs."""
+        for job in self._jobs:
+            job.dropped = job.cell not in cells
+        known = [job for job in self._jobs if not job.dropped]
+        self._jobs = [next((job for job in known if job.cell == cell), None) or self._begun(cell) for cell in cells]
+        self.active = max(min(self.active, len(self._jobs) - 1), 0)
 
     def change(self, cell: Cell) -> None:
         """Run the active cell with other parameters; its old curve stays until then."""

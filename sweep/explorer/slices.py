@@ -44,7 +44,7 @@ class PlacedAxis(Axis):
         return np.interp(values, [low, *self.values, high], places, left=np.nan, right=np.nan)
 
 
-ADDRESS = frozenset({"x", "y", "show", "palette", "low", "high", "with", "cell", "frame"})
+ADDRESS = frozenset({"x", "y", "show", "palette", "scale", "low", "high", "zoom", "with", "cell", "frame"})
 """The keys of an address other than axes (`sweep.explorer.state`)."""
 
 
@@ -69,6 +69,7 @@ class Source:
             raise FileError(f"{name}: the axis {min(taken)} has the name of a key of the explorer's address")
         self.name = name
         self.dims = dims
+        self._known_extremes: dict[str, Array] = {}
         ascending = {d: np.argsort(dataset[d].values, kind="stable") for d in (*dims, "sign") if d in dataset.indexes}
         self.dataset = dataset.isel({d: o for d, o in ascending.items() if (np.diff(o) < 0).any()})
         # Those of the cells, followed by those along which a variable has several values per cell.
@@ -115,6 +116,19 @@ class Source:
         chosen = {*self.dims, *self.dims_of(name)} - {x, y}
         part = self.dataset.isel({d: at.get(d, 0) for d in chosen})
         return describe(part, name, x, y)
+
+    def extremes(self, name: str) -> Array:
+        """The lowest and the highest value of a variable in all maps, or of all counts; empty without any value."""
+        counts = [n for n in self.variables if of(n).theory and not of(n).derive]
+        values = [self._extremes(n) for n in (counts if name in counts else [name])]
+        return np.concatenate(values)
+
+    def _extremes(self, name: str) -> Array:
+        if name not in self._known_extremes:
+            values = marks.with_results(self.dataset, name)
+            finite = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+            self._known_extremes[name] = np.array([finite.min(), finite.max()]) if finite.size else finite
+        return self._known_extremes[name]
 
     def parameters_at(self, names: tuple[str, ...], index: Mapping[str, int]) -> dict[str, float]:
         """The parameters `names` of the cell at `index`, if the dataset has them; on further axes, the first value."""

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 from urllib.parse import urlencode
 
+import numpy as np
+
 from sweep.axis import Axis
 from sweep.explorer.slices import Source
 from sweep.faults import brief
@@ -30,6 +32,9 @@ _ZERO = 1e-100
 
 # Largest number of unknown keys of an address in a message.
 _NAMED = 5
+
+_ZOOM = "zoom"
+"""The key of the part of the map that is shown, which the page itself reads and writes."""
 
 Cell = Mapping[str, float]
 """The parameters of a trajectory."""
@@ -51,6 +56,8 @@ class State:
     """The index on each axis that is not drawn."""
     cells: tuple[Cell, ...] = ()
     palette: str = ""
+    scale: str = ""
+    """Whose values set the colours: those of all maps, or "map" for those of the map that is shown."""
     limits: Mapping[str, float] = field(default_factory=dict)
     """Ends of the colour scale that the visitor has chosen; the values determine the others."""
     changed: Cell = field(default_factory=dict)
@@ -113,18 +120,38 @@ def choices(source: Source) -> dict[str, Choice]:
         exact, short = [f"{v:.12g}" for v in axis.values], [f"{labels.number(v)}{unit}" for v in axis.values]
         found.append(Choice(name, source.words(name), exact, short, axis))
     found.append(Choice("palette", "palette", PALETTES, ["default", *PALETTES[1:]]))
+    found.append(Choice("scale", "colours", ("", "map"), ("same in all maps", "of this map")))
     return {choice.name: choice for choice in found}
 
 
 def first(source: Source) -> State:
-    """The state for an address without a query: the dataset's subject over its two longest axes, as in a picture."""
+    """The state for an address without a query: the dataset's subject over its two longest axes, as in a picture.
+
+    The other axes have their first value, but start spins the largest and signs the positive one.
+    """
     about = subject(source.dataset)
     show = about if about in source.variables else source.variables[0]
     dims = [str(d) for d in source.cell[show].dims if d != _CHOSEN]
     dims += [d for d in source.axes if d not in (*dims, _CHOSEN)][: max(0, 2 - len(dims))]
     longest = sorted(dims, key=lambda d: -len(source.axes[d].values))[:2]
     *y, x = [d for d in dims if d in longest]
-    return State(x, y[0] if y else "", show, dict.fromkeys(source.axes, 0))
+    last = {d: len(axis.values) - 1 for d, axis in source.axes.items() if d in ("n0", "omega3", _CHOSEN)}
+    return State(x, y[0] if y else "", show, dict.fromkeys(source.axes, 0) | last)
+
+
+def telling(source: Source, state: State) -> dict[str, int]:
+    """Return the index of a cell of a map to show first: of the cells that reverse, one that counts as most of them.
+
+    Of several, it is the one nearest to the middle, which is also taken without any count.
+    """
+    part = source.map(state.show, state.x, state.y, state.at)
+    values = np.where(part.blank, 0, part.values)
+    some = values[values > 0]
+    here = values == np.median(some) if some.size else ~part.blank
+    rows, columns = np.nonzero(here if here.any() else np.ones(values.shape, bool))
+    height, width = values.shape
+    k = np.hypot((rows + 0.5) / height - 0.5, (columns + 0.5) / width - 0.5).argmin()
+    return {**state.at, state.x: int(columns[k])} | ({state.y: int(rows[k])} if state.y else {})
 
 
 def write(state: State, source: Source, base: Cell) -> str:
@@ -169,10 +196,10 @@ def read(
             state = replace(state, limits={**state.limits, key: at})
         elif key in LIMITS:
             faults.append(f"{key}={brief(values[-1])}: give a number from {-LARGEST:g} to {LARGEST:g}")
-        elif key not in ("cell", "with"):
+        elif key not in ("cell", "with", _ZOOM):
             unknown.append(f"'{brief(key)}'")
     if unknown:
-        expected = ", ".join([*all_choices, *LIMITS, "with", "cell"])
+        expected = ", ".join([*all_choices, *LIMITS, _ZOOM, "with", "cell"])
         those, more = ", ".join(unknown[:_NAMED]), " …" if len(unknown) > _NAMED else ""
         faults.append(f"unknown URL parameter {those}{more}; expected one of {expected}")
     if len(state.limits) == len(LIMITS) and not state.limits["low"] < state.limits["high"]:

@@ -20,18 +20,22 @@ from sweep.explorer.slices import PlacedAxis
 from sweep.explorer.state import State
 from sweep.grid import Array
 from sweep.plots import marks, scales
-from sweep.plots.description import Map, common_scale
+from sweep.plots.description import Map
+from sweep.plots.description import scale_of as scale_of_values
 from sweep.plots.pictures import of
 from sweep.plots.scales import AUTO, Scale
 
 SOFT = "#77828d"
-"""A grey that can be read on a light page and on a dark one."""
+"""A grey for lines on a light page and on a dark one; letters need more contrast."""
 
 GRID = f"{SOFT}40"
 """The colour of lines across a figure."""
 
 CURVES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#8a6d00")
 """Colours of curves, from Okabe and Ito: safe for the colour-blind."""
+
+DARK = ("#0072b2", "#8a6d00")
+"""Those on which white letters can be read; on the others, black ones can."""
 
 _TICKS = 12
 """Largest number of ticks of an axis whose values are listed one by one."""
@@ -84,17 +88,18 @@ def mapping(scale: Scale) -> dict[str, Any]:
     return {"palette": [to_hex(colour) for colour in scale.rgba(at)], "low": low, "high": high}
 
 
-def scale_of(part: Map, state: State, *others: Map) -> Scale:
-    """The scale of a map, with the visitor's choices; all values of flags, and of `others`, have colours."""
+def scale_of(part: Map, state: State, known: Array) -> Scale:
+    """The scale of a map, with the visitor's choices: of all flags, or of the `known` values unless it is rescaled."""
     palette = state.palette or None
     if part.flags:
         return scales.flags(part.flags, palette)
-    shown = part.shown[np.isfinite(part.shown)].astype(float)
+    values = part.shown if state.scale else np.concatenate([part.shown, known])
+    shown = values[np.isfinite(values)].astype(float)
     if not state.limits or not shown.size:
-        return common_scale([part, *others], cmap=palette)
+        return scale_of_values(part, values, cmap=palette)
     low, high = state.limits.get("low", shown.min()), state.limits.get("high", shown.max())
     possible = low < high and (low > 0 or of(part.name).scale != "ratios")
-    return common_scale([part], (low, high) if possible else AUTO, palette)
+    return scale_of_values(part, values, (low, high) if possible else AUTO, palette)
 
 
 def is_logarithmic(scale: Scale) -> bool:
@@ -132,6 +137,13 @@ TILES = {
     "round_off": _tile(8, lambda _, y: _lines(y)),
 }
 assert [*TILES, "uncertain"] == list(marks.WORDS)  # drawn as a dot
+
+
+def line(dash: str, width: float) -> str:
+    """The CSS of a line in a legend, whose dash is that of Bokeh."""
+    drawn, period = {"dashed": (6, 12), "dotted": (2, 6)}.get(dash, (1, 1))
+    dashes = f"repeating-linear-gradient(90deg,currentColor 0 {drawn}px,transparent {drawn}px {period}px)"
+    return f"background:{dashes};height:{2 * width}px"
 
 
 def swatch(kind: str) -> str:

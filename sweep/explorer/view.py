@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
+from urllib.parse import parse_qs
 
 from bokeh.document import Document
 from bokeh.models import Button, Column, ColumnDataSource, CustomJS, Div, Row
@@ -19,7 +20,7 @@ from sweep.explorer.runner import Curve, Drawn, Job, Runner
 from sweep.explorer.setup import Setup, why_still
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell, State
-from sweep.explorer.style import CURVES
+from sweep.explorer.style import CURVES, DARK
 from sweep.plots import labels
 
 _NOTICE = {"background": "#1b2733", "border-radius": "8px", "color": "white", "padding": "6px 16px"}
@@ -31,6 +32,8 @@ class View:
     _shown: figure.MapFigure
     _curves: Sequence[Curve | None] = ()
     """The curves on the page."""
+    _first: dict[str, int] | None = None
+    """The cell whose values are shown until the pointer is on another one."""
     _other: bodies.Body | None = None
     """The job that counts the reversals of another body, if the page shows one."""
     _counts: bodies.Counts | None = None
@@ -50,6 +53,11 @@ class View:
             self.state = replace(self.state, changed={})
         self._build()
         self._runner = runner
+        at_first_sight = not query and setup is not None and runner is not None
+        if at_first_sight:
+            self._first = states.telling(source, self.state)
+            self.state = replace(self.state, cells=(self._cell_at(self._first),))
+        self._figures.player.play_at_once(at_first_sight)
         self._drawn = Drawn(self.state.cells, runner, self._report)
         self._count_others()
         self._draw_map()
@@ -60,8 +68,10 @@ class View:
     # ---- parts of the page
 
     def _build(self) -> None:
-        self._address = ColumnDataSource({"query": []})
+        # The server writes the address of the page to the first; the browser writes that to go back to to the second.
+        self._address, self._wanted = ColumnDataSource({"query": []}), ColumnDataSource({"query": []}, name="wanted")
         self._address.js_on_change("data", CustomJS(code="sweep.address(cb_obj.data.query[0])"))
+        controls.on(self._wanted, "data", lambda data: self._visit(str(data["query"][0])))
         self._map = Column(sizing_mode="stretch_width", name="map")
         # Bokeh would read mathematics, with links and HTML, in texts of a dataset or of an address.
         plain: dict[str, Any] = {"disable_math": True, "sizing_mode": "stretch_width"}
@@ -72,7 +82,13 @@ class View:
         self._body = controls.BodyControls(self._source, self._constants, self._known, self._change)
         edits = self._edit, self._activate, self._remove
         self._chosen = controls.CellControls(self._source, self._base, self._known, *edits)
-        self._document.js_on_event("document_ready", self._figures.player.moment)
+        self._document.js_on_event("document_ready", self._figures.player.begin)
+        self._document.js_on_event(
+            "document_ready", CustomJS(args={"wanted": self._wanted}, code="sweep.ready(wanted)")
+        )
+        self._document.config.notify_connection_status = False  # the page says it in words of its own
+        for event, lost in (("connection_lost", "true"), ("client_reconnected", "false")):
+            self._document.js_on_event(event, CustomJS(code=f"sweep.ended({lost})"))
         for root in (self._controls.root, self._notice, self._map, self._legend, self._body.root, self._cell,
                      self._figures.root, self._figures.player.root, self._chosen.root, self._link()):  # fmt: skip
             self._document.add_root(root)
@@ -88,6 +104,15 @@ class View:
             if not stays:
                 self._draw_map()
             self._draw_cells()
+
+    def _visit(self, address: str) -> None:
+        """Show what an address names, when the visitor goes back to it."""
+        query = parse_qs(address.removeprefix("?"), keep_blank_values=True)
+        state, faults = states.read(query, self._source, self._base, self._known)
+        self._drawn.show(state.cells)
+        self._change(lambda _: state)
+        self._faults = faults
+        self._draw_cells()
 
     def _count_others(self) -> bool:
         """Count for the body of the state if it is another one; return whether counts are about to come."""
@@ -127,7 +152,7 @@ class View:
 
     def _point(self) -> None:
         """Show the values of the cell under the pointer, or else of the chosen one."""
-        index = self._place(self._shown.probe)
+        index = self._place(self._shown.probe) or self._first
         if index is None:
             self._cell.text = str(PARTS.hint("" if self._setup else why_still(self._source)))
             return
@@ -147,13 +172,17 @@ class View:
         index = self._place(self._shown.request)
         if index is None or not self._setup:
             return
-        cell = {**self._base, **self._source.parameters_at(tuple(self._base), index), **self.state.changed}
+        cell = self._cell_at(index)
         if cell in self._drawn.cells:
             self._activate(self._drawn.cells.index(cell))
             return
         self._faults = []
         self._drawn.add(cell, keep=bool(self._shown.request.data["add"][0]))
         self._draw_cells()
+
+    def _cell_at(self, index: Mapping[str, int]) -> Cell:
+        """Return the parameters of a cell, of the body that is shown."""
+        return {**self._base, **self._source.parameters_at(tuple(self._base), index), **self.state.changed}
 
     def _edit(self, name: str, value: float) -> None:
         """Run the active cell with another value of a parameter."""
@@ -202,6 +231,7 @@ class View:
             "y": [source.axes[y].place(cell[y]) if y else 0.0 for _, cell in on_map],
             "colour": [CURVES[k] for k, _ in on_map],
             "number": [str(k + 1) for k, _ in on_map],
+            "ink": ["white" if CURVES[k] in DARK else "black" for k, _ in on_map],
             "alpha": [1.0 if all(cell.get(d, v) == v for d, v in here.items()) else 0.45 for _, cell in on_map],
         }
         self._draw_curves()
@@ -229,8 +259,8 @@ class View:
     def _draw_progress(self) -> None:
         names = self._names()
         jobs = [(names[k], job) for k, job in self._drawn.running()]
-        jobs += [("counts", self._other)] if self._other and not self._other.over else []
-        running = [(f"{name}: {job.delay or f'{job.share:.0%}'}", job.share) for name, job in jobs]
+        jobs += [("counts of another body", self._other)] if self._other and not self._other.over else []
+        running = [(f"working on {name}: {job.delay or f'{job.share:.0%}'}", job.share) for name, job in jobs]
         self._notice.text = str(PARTS.notice(self._faults, running))
         self._notice.visible = bool(self._faults or running)
 
@@ -247,7 +277,7 @@ class View:
         link.js_on_click(CustomJS(args={"button": link}, code="sweep.copy(button)"))
         # The address is attached to a root, because models that only a callback of the document refers to are not
         # updated.
-        return Row(link, name="share", tags=[self._address], stylesheets=[controls.WIDGETS])
+        return Row(link, name="share", tags=[self._address, self._wanted], stylesheets=[controls.WIDGETS])
 
 
 def _counted(curve: Curve | None) -> str:

@@ -113,8 +113,11 @@ def along(dataset: xr.Dataset, dim: str) -> Array:
 
 def common_scale(maps: Sequence[Map], limits: Limits = AUTO, cmap: str | None = None) -> Scale:
     """Return the scale of a map, or the common scale of several maps of one kind of value."""
-    first = maps[0]
-    values = np.concatenate([each.shown for each in maps])
+    return scale_of(maps[0], np.concatenate([each.shown for each in maps]), limits, cmap)
+
+
+def scale_of(first: Map, values: Array, limits: Limits = AUTO, cmap: str | None = None) -> Scale:
+    """Return the scale for these values of the variable of a map, shape (values,)."""
     if first.flags:
         present = {int(v): first.flags.get(int(v), str(v)) for v in np.unique(values)}
         return scales.flags(present or first.flags, cmap)

@@ -89,7 +89,8 @@ def shared_kinds(dataset: xr.Dataset, name: str) -> dict[str, str]:
 def with_results(dataset: xr.Dataset, name: str) -> Array:
     """The values of the cells that have a result to draw, shape (cells,)."""
     found, kinds = field(dataset, name), marks(dataset, name)
-    return np.asarray(found.values[~np.any([kinds[kind].values for kind in BLANK], axis=0)])
+    values, *blank = xr.broadcast(found, *(kinds[kind] for kind in BLANK))
+    return np.asarray(values.values[~np.any([where.values for where in blank], axis=0)])
 
 
 def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:

@@ -5,7 +5,7 @@ This needs the dataset alone, and no plotting library.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ import xarray as xr
 from sweep.axis import Axis, contours
 from sweep.grid import Array
 from sweep.models.ladder.analytic import best_b
+from sweep.parameters import START
 
 _SOURCES = {
     "n_c1": (("_linear", "eigenvalues"), ("", "formula")),
@@ -29,6 +30,13 @@ STYLES = {"n_c1": ("dotted", 1.2), "n_c2": ("solid", 1.2), "best": ("dashed", 1.
 
 OVER_TIME = {"n_c2": "dashed", "n_c1": "dotted"}
 """Dashes of critical spins over time."""
+
+
+def holds(name: str, changed: Iterable[str]) -> bool:
+    """Return whether a line of a map still holds where these parameters, which are not axes, have other values."""
+    depends = {"best": set(changed) & {"a", "c"}, "boundary": set(changed)}
+    return not depends.get(name, set(changed) - START)
+
 
 Points = tuple[Array, Array]
 """x and y of a line."""

@@ -28,6 +28,7 @@ from support import ROOT, own
 import sweep
 from sweep.explorer.runner import Job
 from sweep.explorer.slices import Source
+from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.plots import animation, labels
 
 if TYPE_CHECKING:
@@ -309,7 +310,9 @@ def test_boundaries_have_their_counts(clicked: Page, counts: np.ndarray) -> None
 def test_the_pointer_shows_all_of_a_cell(clicked: Page, opened: xr.Dataset) -> None:
     near = tip(clicked, 2, 0)
     clicked.locator("#cell").get_by_text("μ = 60, b = 2, n₀ = 0.05").wait_for()
+    clicked.evaluate("sweep.fold()")
     shown = text(clicked, "cell")
+    clicked.evaluate("sweep.fold()")
     cell = opened.isel(mu=2, b=0, n0=N0)
     assert "lower bound" in shown
     for name in ("spin_final", "t_stop", "n_c1_linear", "form_factor", "energy_error"):
@@ -338,7 +341,7 @@ def test_cuts_follow_the_pointer(clicked: Page, counts: np.ndarray) -> None:
 
 def test_axes_variable_and_selection_change(go: Open, served: str, opened: xr.Dataset) -> None:
     page = settle(go(served))
-    assert page.url.endswith("?show=reversals&x=b&y=mu&n0=0.02&sign=-1")
+    assert "?show=reversals&x=b&y=mu&n0=0.05&sign=1&cell=" in page.url
     select(page, "x", "friction μ", "x=mu&y=b")
     select(page, "y", "start spin n₀", "x=mu&y=n0")
     settle(page)
@@ -362,7 +365,11 @@ def test_another_body_is_estimated_and_then_simulated(visit: Open, counts: np.nd
     for _ in range(30):
         page.keyboard.press("ArrowRight")
     wait(page, "map figure", "/^spin reversals, simulated, δ = 0.045.* rad$/.test(m.title.text)")
-    assert page.url.endswith("&n0=0.05&sign=-1&with=delta:0.0455")
+    assert page.url.endswith("&n0=0.05&sign=1&with=delta:0.0455")
+    assert "grey dots: lines of the dataset's body" in text(page, "legend")
+    lines = {name: model(page, name, "m.data.xs.length") for name in ("stale", "line best", "line boundary")}
+    assert lines == {"stale": lines["stale"], "line best": 1, "line boundary": 0}
+    assert lines["stale"] > 2
     body, friction = {"b": [2, 3, 4, 5], "delta": 0.0455}, {"mu": [40, 50, 60, 70, 80]}
     other = sweep.run(
         {"body": body, "friction": friction, "measure": ["reversals"]}, t_end=1500, method="dopri5", n0=0.05
@@ -406,7 +413,7 @@ def test_no_cell_is_shown_along_other_axes(opened: xr.Dataset) -> None:
     cell = document.get_model_by_name("cell")
     nothing = cell.text
     document.get_model_by_name("probe").data = {"i": [1], "j": [1]}
-    assert "μ = 50, b = 3, n₀ = 0.02" in cell.text
+    assert "μ = 50, b = 3, n₀ = 0.05" in cell.text
     document.get_model_by_name("y").value = "n0"
     assert cell.text == nothing
 
@@ -528,7 +535,111 @@ def test_a_wrong_link_is_reported_and_harmless(visit: Open) -> None:
     assert "show=reversals" in page.url
 
 
+def test_at_first_sight_a_trajectory_runs_and_its_body_turns(go: Open, served: str) -> None:
+    """The map is that of the largest start spin, and no part of the page is empty."""
+    page = settle(go(served))
+    wait_for_curves(page, 1)
+    assert "n0=0.05" in page.url
+    wait(page, "time", "m.value > 0")
+    wait(page, "body", f"{FACES}.xs.length")
+    cell = page.locator("#cell")
+    assert cell.get_by_text("spin reversals, simulated").count() == 1
+    assert int(text(page, "cell").split("spin reversals, simulated")[1].split()[0]) > 0
+    rows = cell.locator("tr")
+    assert rows.count() > 10
+    assert sum(rows.nth(k).is_visible() for k in range(rows.count())) == 5
+    cell.get_by_role("button", name="values").click()
+    assert all(rows.nth(k).is_visible() for k in range(rows.count()))
+    page.close()
+
+
+def test_a_colour_means_one_count_in_all_maps(page: Page, opened: xr.Dataset, counts: np.ndarray) -> None:
+    """Unless the visitor has the map rescaled."""
+    ends = "[m.renderers[0].glyph.color_mapper.low, m.renderers[0].glyph.color_mapper.high].map(Math.round)"
+    simulated = opened["reversals"].where(opened["status"].isin([SETTLED, TIME_LIMIT]))
+    low, high = (
+        int(f([getattr(v, f.__name__)() for v in (simulated, opened["reversals_predicted"])])) for f in (min, max)
+    )
+    colours = []
+    for slider in ("ArrowLeft", "ArrowRight"):
+        control(page, "n0", "[role=slider]").focus()
+        page.keyboard.press(slider)
+        page.wait_for_url(re.compile("n0=0.02" if slider == "ArrowLeft" else "n0=0.05"))
+        settle(page)
+        colours.append(colour_in_palette(page, counts.max()))
+        assert model(page, "map figure", ends)[1] >= high - 1
+        assert model(page, "map figure", ends)[0] <= low + 1
+    assert colours[0] == colours[1]
+    select(page, "scale", "of this map", "scale=map")
+    wait(page, "map figure", f"{ends}[1] < {high}")
+    settle(page)
+    assert colour_in_palette(page, counts.max()) != colours[0]
+
+
+def test_back_undoes_the_last_choice(page: Page) -> None:
+    before, url = image(page), page.url
+    select(page, "show", "final spin n", "show=spin_final")
+    settle(page)
+    page.wait_for_timeout(800)
+    page.mouse.click(*place(page, 3, 2))
+    wait_for_curves(page, 1)
+    page.go_back()
+    page.wait_for_url(re.compile("show=spin_final(?!.*cell=)"))
+    wait(page, "curve legend", "m.items.every((i) => !i.visible)")
+    page.go_back()
+    wait(page, "show", "m.value === 'reversals'")
+    settle(page)
+    assert (page.url, image(page)) == (url, before)
+    page.go_forward()
+    wait(page, "show", "m.value === 'spin_final'")
+
+
+def test_the_zoom_stands_in_the_link(page: Page, visit: Open) -> None:
+    page.evaluate(f"{MAP}.x_range.setv({{start: 48, end: 72}})")
+    page.wait_for_url(re.compile("zoom=48:72:"))
+    other = visit(page.url.partition("?")[2])
+    wait(other, "map figure", "m.x_range.start === 48 && m.x_range.end === 72")
+    select(other, "show", "final spin n", "show=spin_final.*zoom=48:72:")
+    assert "zoom" not in text(other, "notice")
+    other.evaluate(f"{MAP}.x_range.reset()")
+    other.wait_for_url(re.compile("^(?!.*zoom)"))
+    other.close()
+
+
+def test_the_page_says_how_to_start_a_server_that_has_ended(browser: Browser, tiny: Path) -> None:
+    with explorer(tiny) as process, browser.new_context() as context:
+        page = context.new_page()
+        page.goto(address(process))
+        settle(page)
+        assert page.locator("#ended").is_hidden()
+        stopped(process)
+        page.locator("#ended").wait_for(state="visible", timeout=TIMEOUT)
+        assert page.locator("#ended").inner_text() == (
+            f"The explorer has ended. To start it again: python -m sweep explore {tiny}"
+        )
+
+
 # ---- the keyboard, and narrow windows
+
+
+def test_a_screen_reader_has_names_and_short_news(clicked: Page, counts: np.ndarray) -> None:
+    clicked.wait_for_timeout(1000)
+    for name in ("start spin n₀", "δ (rad)", "time", "drag mu"):
+        assert clicked.get_by_role("slider", name=name, exact=True).count() == 1, name
+    assert clicked.get_by_role("slider", name="start spin n₀").get_attribute("aria-valuetext") == "0.05"
+    for name in ("Box Zoom", "Reset", "Save"):
+        assert clicked.get_by_role("button", name=name, exact=True).count() >= 1, name
+    clicked.locator("#map").focus()
+    clicked.keyboard.press("ArrowRight")
+    first = clicked.locator("#said").inner_text()
+    clicked.keyboard.press("ArrowUp")
+    second = clicked.locator("#said").inner_text()
+    assert first != second
+    found = re.fullmatch(r"spin reversals, simulated: (\d+|no value), at μ = (\d+), b = (\d+)", second)
+    assert found
+    shown = counts[int(found[3]) - 2, (int(found[2]) - 40) // 10]
+    assert found[1] in (str(shown), "no value")
+    assert clicked.locator("[aria-live=polite]").count() == 2  # that of the notice, and this one
 
 
 def test_everything_can_be_done_with_the_keyboard(page: Page) -> None:
@@ -608,7 +719,7 @@ def test_a_click_runs_a_users_model_that_the_user_names(go: Open, tmp_path: Path
     own.write(tmp_path)
     run = sweep.run(tmp_path / "pendulum.yaml", tmp_path, torque=[0.5, 1.0, 1.2], damping=[0.3, 0.5], t_end=60)
     with explorer(tmp_path / "pendulum.nc", "--model", tmp_path / "pendulum.py") as process:
-        page = settle(go(address(process)))
+        page = settle(go(f"{address(process)}?x=torque"))
         spot = {"torque": 2, "damping": 1}
         page.mouse.click(*place(page, *(spot[str(dim)] for dim in reversed(run["reversals"].dims))))
         wait_for_curves(page, 1)

@@ -114,7 +114,7 @@ def test_a_map_without_any_result_has_a_scale(opened: xr.Dataset) -> None:
     source = Source(opened.assign(status=xr.full_like(opened["status"], LIFT_OFF)))
     part = source.map("reversals", "mu", "b", {"n0": 1})
     assert not part.shown.size
-    assert style.beyond(part, style.scale_of(part, state.first(source))) == ""
+    assert style.beyond(part, style.scale_of(part, state.first(source), source.extremes(part.name))) == ""
 
 
 @pytest.mark.browser
@@ -125,5 +125,19 @@ def test_a_ratio_keeps_its_scale_where_a_limit_is_not_positive(opened: xr.Datase
     times = opened["b"].expand_dims(reversal=[1])
     source = Source(opened.assign(reversal_times=times, t_first_reversal_predicted=2 * opened["mu"]))
     part, first = source.map("ratio", "mu", "b", {"n0": 1}), state.first(source)
-    scales = [style.scale_of(part, each) for each in (first, replace(first, limits={"low": low}))]
+    scales = [
+        style.scale_of(part, each, source.extremes("ratio")) for each in (first, replace(first, limits={"low": low}))
+    ]
     assert style.mapping(scales[0]) == style.mapping(scales[1])
+
+
+def test_the_ends_of_a_scale_are_those_of_all_maps_and_of_all_counts(source: Source, opened: xr.Dataset) -> None:
+    """Without cells that failed, whose counts mean nothing."""
+    counts = opened["reversals"].where(opened["status"] != LIFT_OFF)
+    low = min(counts.min(), opened["reversals_predicted"].min())
+    high = max(counts.max(), opened["reversals_predicted"].max())
+    for name in ("reversals", "reversals_predicted"):
+        ends = source.extremes(name)
+        assert (ends.min(), ends.max()) == (low, high)
+    spins = opened["spin_final"].where(opened["status"] != LIFT_OFF)
+    assert source.extremes("spin_final").tolist() == [spins.min(), spins.max()]

@@ -1,7 +1,9 @@
 """The address of the explorer: what is written there opens the same page, and nothing else gets through."""
 
+from dataclasses import replace
 from urllib.parse import parse_qs
 
+import numpy as np
 import pytest
 
 from sweep.explorer import state
@@ -13,7 +15,7 @@ HOSTILE = {
     "show=../../etc/passwd": "show=../../etc/passwd is not there; choose reversals, ",
     "show=<script>alert(1)</script>": "show=<script>alert(1)</script> is not there; choose ",
     "x=delta": "x=delta is not there; choose mu, b, n0",
-    "file=/etc/passwd": "unknown URL parameter 'file'; expected one of show, x, y, mu, b, n0, sign, palette, low,",
+    "file=/etc/passwd": "unknown URL parameter 'file'; expected one of show, x, y, mu, b, n0, sign, palette, scale,",
     "n0=nan": "n0=nan is not there; choose from 0.02 to 0.05",
     "n0=" + "1" * 5000: "n0=1111",
     "palette=jet": "palette=jet is not there; choose , viridis",
@@ -44,7 +46,9 @@ def test_the_longest_axes_are_shown_first(source: Source) -> None:
 
 def test_what_is_written_is_read_again(source: Source, base: state.Cell) -> None:
     cells = ({**base, "mu": 47.123456789, "b": 3.0}, {**base, "delta": -0.25})
-    shown = State("n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 0, "sign": 1}, cells, "gray", limits={"high": 4.5})
+    shown = State(
+        "n0", "mu", "difference", {"mu": 0, "b": 2, "n0": 1, "sign": 1}, cells, "gray", "map", limits={"high": 4.5}
+    )
     again, faults = read(state.write(shown, source, base), source, base)
     assert not faults
     assert again == shown
@@ -88,3 +92,19 @@ def test_an_axis_chosen_twice_changes_places(query: str, source: Source, base: s
     shown, faults = read(query, source, base)
     assert not faults
     assert (shown.x, shown.y) == ("b", "mu")
+
+
+def test_the_first_cell_is_one_of_the_usual_count_near_the_middle(source: Source) -> None:
+    shown = state.first(source)
+    part = source.map(shown.show, shown.x, shown.y, shown.at)
+    cell = state.telling(source, shown)
+    counts = part.values[~part.blank & (part.values > 0)]
+    assert part.values[cell[shown.y], cell[shown.x]] == np.median(counts)
+    assert cell["n0"] == shown.at["n0"] == 1
+
+
+def test_without_any_count_the_first_cell_is_in_the_middle(source: Source) -> None:
+    shown = replace(state.first(source), show="spin_error")
+    nothing = Source(source.dataset.assign(spin_error=source.dataset["spin_final"] * np.nan))
+    cell = state.telling(nothing, shown)
+    assert abs(cell[shown.x] - len(source.axes[shown.x].values) / 2) <= 1

@@ -138,7 +138,7 @@ def test_pictures_and_explorer_have_the_same_colours(name: str, whole: xr.Datase
 
     whole["reversals"] += xr.DataArray(np.arange(SIZE[1], dtype="int16") ** 3, dims="delta")
     shown = MapFigure(Source(whole), "delta", "n0")
-    part, _ = shown.show(replace(state.first(Source(whole)), show=name))
+    part, _ = shown.show(replace(state.first(Source(whole)), show=name, scale="map"))
     (bar,) = shown.figure.right
     mapper, values = bar.color_mapper, np.unique(part.shown)
     straight = np.log if "Log" in type(mapper).__name__ else np.asarray
