@@ -7,7 +7,7 @@ from support import ROOT
 
 _PAGE = (ROOT / "docs" / "how-to" / "bring-a-model.md").read_text(encoding="utf-8")
 
-SHOWN: dict[str, str] = dict(re.findall(r"```\{code-block\}\n:caption: (\S+)\n\n(.*?)```", _PAGE, re.DOTALL))
+SHOWN: dict[str, str] = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", _PAGE, re.DOTALL))
 """What the page shows, by the name of the file."""
 
 PENDULUM, FADING = SHOWN["pendulum.py"], SHOWN["fading.py"]
