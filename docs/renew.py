@@ -129,7 +129,7 @@ def _draw(source: str, target: Path) -> None:
         _photograph(target)
     else:
         shutil.copy(source, target)
-    if target.suffix == ".png":
+    if target.suffix == ".png" and source != "explorer":  # whose greys would turn pink
         few = Image.open(target).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
         few.save(target, optimize=True)  # a third as large
 
@@ -146,7 +146,9 @@ def _photograph(target: Path) -> None:
         page = browser.new_page(viewport={"width": 1250, "height": 900})
         page.goto(f"{shown.url}{_EXPLORED}")
         page.wait_for_function("window.Bokeh?.documents[0]?.is_idle")
-        page.wait_for_timeout(20_000)  # both trajectories have ended
+        page.wait_for_timeout(5000)  # both trajectories have begun
+        while page.get_by_text("working on").locator("visible=true").count():
+            page.wait_for_timeout(1000)
         box = page.locator("#map").bounding_box()
         assert box
         page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 330)
