@@ -33,7 +33,7 @@ from sweep.kernels.measures.margin import last_arc
 from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import endings, ends_as_predicted, only
 from sweep.kernels.measures.reversals import Reversals
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 
 ROUND_OFF = 1e-13
 """An error in spin that no shorter step reduces, in sqrt(g/c)."""

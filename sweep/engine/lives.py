@@ -19,7 +19,7 @@ from sweep.grid import Array
 from sweep.kernels.layout import Table
 from sweep.kernels.method import REPEAT
 from sweep.kernels.status import QUIET, RUNNING
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 
 RUN, APPROACH, SECOND, DONE = range(4)
 """Stages of a cell: it runs to its end; it runs to a few steps ahead of a failure, which is set aside; it runs a second

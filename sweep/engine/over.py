@@ -26,9 +26,9 @@ from sweep.kernels.measures.resting_spin import endings
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.models.general import rigid_body, starts
 from sweep.models.model import Offer
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.models.stiff.modes import bending
-from sweep.models.theory import linear
+from sweep.models.theory import linear, modes
 from sweep.models.theory.rocking import frequencies
 
 # Safety factor on the change of the spin at the present rates, where the slow equations do not hold.
@@ -80,7 +80,7 @@ def _stays(cells: Cells) -> Array:
     """Return where the spin keeps its sign and the rattle decays even at `_REACH` times the predicted change."""
     model, constants, states = cells.model, cells.kernel.unpack(cells.rows)[1], cells.kernel.model_states(cells.rows)
     spin, _, _ = model.energy(tuple(states), constants)
-    farthest = spin + _REACH * (linear.resting_spin(model, constants, states) - spin)
+    farthest = spin + _REACH * (modes.resting_spin(model, constants, states) - spin)
     known = np.isfinite(farthest)
     growth = linear.growth_rate(model, constants, np.where(known, farthest, spin))
     return np.asarray(known & (spin * farthest > 0) & (growth < 0))

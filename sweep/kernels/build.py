@@ -1,9 +1,9 @@
 """Compile the pieces of kernels into the cache, side by side, each in its own process.
 
 The arguments of such a process are PIECE METHOD MODEL [MEASURE …]. A PIECE is `kernel`, or another part that runs need:
-`beginning` and `endings`, `path` for single trajectories, `failing` once a trajectory has failed, and `exchange` and
-`follow` for estimated counts. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line
-of standard input.
+`beginning`, `exchange` and `follow` for the slow equations, `path` for single trajectories, and `failing` once a
+trajectory has failed. For a user's model, MODEL is "name@digest", and the record of its origin comes as a line of
+standard input.
 
 Separate processes are needed because the code that Numba executes right after compiling is not the code that it caches:
 functions that a kernel calls are compiled once by themselves and once more as part of the kernel, and the last bits of
@@ -29,35 +29,36 @@ from sweep.interrupt import point
 from sweep.jit import Cached, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
-from sweep.kernels.measures.estimate import Estimate
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
 from sweep.kernels.path import compiled_path
 from sweep.models import find
 from sweep.models.model import Model, Offer
 from sweep.models.origin import Origin
-from sweep.models.slow.estimate import compiled_exchange, compiled_follow
-from sweep.models.stiff.final_spin import compiled_following
+from sweep.models.slow.estimate import compiled_exchange
+from sweep.models.slow.follow import compiled_follow
+from sweep.models.stiff.slip import form_of
 from sweep.models.user import loading
 from sweep.models.user.blame import blamed
 
 Job = tuple[tuple[str, ...], Origin | None]
 """The arguments of this module, and the origin of the model."""
 
-KERNEL, BEGINNING, ENDINGS, PATH, FAILING = "kernel", "beginning", "endings", "path", "failing"
-_EXCHANGE, _FOLLOW = "exchange", "follow"
+KERNEL, BEGINNING, PATH, FAILING = "kernel", "beginning", "path", "failing"
+EXCHANGE, FOLLOW = "exchange", "follow"
 
 _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
     BEGINNING: lambda kernel: kernel.stepper.prepared_by(kernel.model),
-    ENDINGS: lambda kernel: (compiled_following(),) if Offer.ENDING in kernel.model.offers else (),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
     FAILING: lambda kernel: (compiled_approach(kernel.model),),
-    _EXCHANGE: lambda kernel: (compiled_exchange(kernel.model),),
-    _FOLLOW: lambda kernel: (compiled_follow(),),
+    EXCHANGE: lambda kernel: (
+        (compiled_exchange(form_of(kernel.model).full),) if Offer.ENDING in kernel.model.offers else ()
+    ),
+    FOLLOW: lambda kernel: (compiled_follow(),) if Offer.ENDING in kernel.model.offers else (),
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {BEGINNING: 4.0, ENDINGS: 3.0, PATH: 4.0, FAILING: 4.0, _EXCHANGE: 8.0, _FOLLOW: 5.0}
+_SECONDS = {BEGINNING: 4.0, PATH: 4.0, FAILING: 4.0, EXCHANGE: 8.0, FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _DOES_NOT_COMPILE = 3
@@ -93,7 +94,7 @@ def build(kernels: Iterable[Kernel], *also: str) -> None:
 
 def build_estimates(model: Model) -> None:
     """Compile what estimates the counts of `model`, as `build` compiles its kernels, if the cache lacks it."""
-    if jobs := [(piece, model.origin) for piece in _lacking(make_kernel(PLAIN, model, ()), (_EXCHANGE, _FOLLOW))]:
+    if jobs := [(piece, model.origin) for piece in _lacking(make_kernel(PLAIN, model, ()), (EXCHANGE, FOLLOW))]:
         with compiling():
             _compile(jobs)
 
@@ -121,8 +122,7 @@ def try_compiling(model: Model) -> None:
 
 def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
     """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
-    estimated = [_EXCHANGE, _FOLLOW] if Estimate.name in kernel.measure else []
-    return _lacking(kernel, (*estimated, KERNEL, BEGINNING, ENDINGS, *also))
+    return _lacking(kernel, (KERNEL, EXCHANGE, FOLLOW, BEGINNING, *also))
 
 
 def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]:

@@ -18,7 +18,7 @@ from sweep.kernels.method import STEP_RULES
 from sweep.kernels.methods import METHODS
 from sweep.kernels.status import COUNT_DOUBTS, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.general.surfaces import ELLIPSOID
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.results.probabilities import PROBABILITIES, probabilities
 from sweep.units import NUMBER, PAPER_UNITS, SPIN, TIME
 from sweep.variables import Variable, attributes

@@ -60,20 +60,16 @@ def test_all_that_two_methods_need_is_compiled_once(started: list[tuple[str, ...
     build(kernel(method, measure=measure) for method in ("adams", "dopri5", "adams"))
     assert started == [
         ("kernel", "adams", "slip", "reversals", "round_off", "decay"),
+        ("exchange", "dopri5", "slip"),
+        ("follow", "dopri5", "slip"),
         ("beginning", "adams", "slip"),
-        ("endings", "dopri5", "slip"),
         ("kernel", "dopri5", "slip", "reversals", "round_off", "decay"),
     ]
 
 
-def test_estimated_counts_have_pieces_of_their_own(started: list[tuple[str, ...]]) -> None:
-    """What follows the slow equations is the same for all models; a prediction needs no kernel."""
-    estimated = [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
-    build([kernel(measure=("reversals", "estimate"))])
-    assert started[:3] == [*estimated, ("kernel", "dopri5", "slip", "reversals", "round_off", "decay")]
-    started.clear()
+def test_estimated_counts_need_no_kernel(started: list[tuple[str, ...]]) -> None:
     sweep.predict({"friction": {"mu": 60}}, measure=["estimate"])
-    assert started == estimated
+    assert started == [("exchange", "dopri5", "slip"), ("follow", "dopri5", "slip")]
 
 
 def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple[str, ...]]) -> None:
@@ -98,7 +94,7 @@ def test_no_more_processes_at_once_than_threads(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(builder, "_start", start)
     with threads(1):
         build([kernel("adams"), kernel()])
-    assert (len(alive), most) == (4, 1)
+    assert (len(alive), most) == (5, 1)
 
 
 def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
@@ -113,7 +109,7 @@ def test_what_is_compiled_is_shown(started: list[tuple[str, ...]]) -> None:
     with showing(show):
         build([kernel()])
     build([kernel()])
-    assert shown == ["begins", 2]
+    assert shown == ["begins", 3]
 
 
 def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,8 +126,8 @@ def test_functions_are_compiled_for_the_arguments_that_they_get(monkeypatch: pyt
     sampled(MODELS["slip"], columns(), np.full(1, 0.1), np.arange(2.0))
     sweep.trajectory({"friction": {"mu": 60}, "start": {"n0": 0.05}}, t_end=10.0)
     assert signatures == dict.fromkeys(signatures, 1)
-    made = ("make_advance", "compiled_start_up", "_follow", "compiled_approach", "compiled_samples", "compiled_path")
-    assert signatures.keys() == set(made)
+    made = {"make_advance", "compiled_start_up", "compiled_approach", "compiled_samples", "compiled_path"}
+    assert signatures.keys() == made | {"compiled_exchange", "make_follow"}
 
 
 def test_measurements_without_a_place_in_the_kernel_share_it() -> None:

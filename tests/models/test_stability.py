@@ -16,7 +16,7 @@ from sweep.kernels.status import SETTLED
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import stack, take
-from sweep.models.theory import linear, stability
+from sweep.models.theory import linear, modes, stability
 from sweep.prediction import predict
 
 SLIP = MODELS["slip"]
@@ -94,11 +94,11 @@ def test_the_spin_that_stays_is_where_an_adaptive_integrator_ends(mu: float, n0:
     constants = slip.MODEL.constants.of(body)
     end = motion(body, [0, 300], rtol=1e-12, atol=1e-16)[:7, -1]
     changed = slip.MODEL.rhs(tuple(end), take(constants, 0))[1][0] - n0
-    found = linear.resting_spin(slip.MODEL, constants, stack(slip.MODEL.start(body))) - n0
+    found = modes.resting_spin(slip.MODEL, constants, stack(slip.MODEL.start(body))) - n0
     assert found == pytest.approx([changed], rel=1e-4)
 
 
 def test_no_spin_stays_where_the_rattle_grows() -> None:
     body = columns(n0=0.05)
     states = stack(slip.MODEL.start(body))
-    assert np.isnan(linear.resting_spin(slip.MODEL, slip.MODEL.constants.of(body), states)).all()
+    assert np.isnan(modes.resting_spin(slip.MODEL, slip.MODEL.constants.of(body), states)).all()

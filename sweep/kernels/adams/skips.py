@@ -233,7 +233,7 @@ class _Outlook(NamedTuple):
         growing = np.argmax(rates, axis=1)
         seen, true = _Modes.of(logs, rates, growing), _Modes.of(logs - scales, rates, growing)
         hard = np.divide(*(np.abs(rattle.slopes[:, k]) for k in (1, 0))) >= _RATIO
-        smaller = np.minimum(1.0, (tolerance / rattle.form.unit(rattle.constants) / _LOOSE) ** 0.25)
+        smaller = np.minimum(1.0, (tolerance / rattle.form.unit(rattle.modes.constants) / _LOOSE) ** 0.25)
         largest, cap = (smaller * np.where(hard, *pair[::-1]) for pair in (_LARGEST, _LARGEST_RESCALED))
         cap = np.minimum(cap, np.sqrt(2 * tolerance / rattle.distances().min(axis=1)))
         share = np.log(tolerance / np.abs(spin))

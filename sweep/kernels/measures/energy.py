@@ -13,7 +13,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.models.model import Array, Offer
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.units import NUMBER
 
 

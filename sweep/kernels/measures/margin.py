@@ -23,7 +23,7 @@ from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.kernels.measures.resting_spin import ends_as_predicted, only
 from sweep.kernels.status import SETTLED
 from sweep.models.model import Array, Offer
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.units import SPIN
 
 EXTREMES = ("overshoot", "nearest_approach")

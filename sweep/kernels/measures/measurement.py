@@ -37,7 +37,7 @@ from typing import ClassVar, NamedTuple
 
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model, Offer
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.units import Unit
 from sweep.variables import Variable
 

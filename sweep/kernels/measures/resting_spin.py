@@ -1,10 +1,9 @@
 """The spin at which a settled trajectory remains when the rest of its rattle has decayed.
 
 A trajectory settles, and ends, while its rattle can still change its spin by a third: the spin at its end is off by
-4 to 6 % (median).  The slow equations (`sweep.models.stiff.final_spin`) give the final value.  Of 79 settled cells
-of the wide domain they were off by 1e-5 (median), by more than 0.1 % in 9 %, by 1.4 % at most; 29 bodies, nearly round
-or hardly damped, have none.  In a coarse `configs/mu_b.yaml` the median was 3e-5; there a few spins beyond n_c1 that
-still hold at t = 1e5, because the rattle that will turn them back is below 1e-14, make up all errors beyond 4 %.
+4 to 6 % (median).  The slow equations (`sweep.models.slow.estimate`) give the final value.  Of 74 settled cells of the
+wide domain that had decayed by t = 400 000, they were off by 1e-5 (median), by more than 0.1 % in 4 %, by 0.4 % at
+most; 11 of 90 bodies have none.  In a coarse `configs/mu_b.yaml` (439 cells) the median was 1.5e-5, and 1.1 % at most.
 """
 
 from __future__ import annotations
@@ -16,16 +15,17 @@ import numpy as np
 
 from sweep.jit import on_all_threads
 from sweep.kernels.layout import Table, constants_of
+from sweep.kernels.measures.decay import WOUND
 from sweep.kernels.measures.measurement import Kind, measured
 from sweep.kernels.status import SETTLED
-from sweep.models.model import Array, Offer, stack
-from sweep.models.stiff.final_spin import Ending, ending
-from sweep.models.stiff.form import STATES
+from sweep.models.model import Array, Model, Offer
+from sweep.models.slow.estimate import Ending, ending
+from sweep.models.stiff.form import STATES, velocities
 from sweep.models.stiff.slip import form_of
 from sweep.units import SPIN
 
 _AT_A_TIME = 512
-"""Number of cells whose ends one thread finds together; each needs 30 kB meanwhile."""
+"""Number of cells whose ends one thread finds together; each needs 10 kB meanwhile."""
 
 
 class RestingSpin(Kind):
@@ -48,10 +48,10 @@ class RestingSpin(Kind):
 def ends_as_predicted(table: Table, left: Ending) -> Array:
     """Return which trajectories have settled as the slow equations predict, shape (cells,).
 
-    A nearly round body may settle because it was watched (`decay`); if the slow equations then predict a reversal, they
-    do not hold for it.
+    A nearly round body may settle because it was watched (`decay`): its rattle is then too large for them.
     """
-    return np.asarray((table["status"] == SETTLED) & (left.reversals == 0))
+    watched = (table[WOUND] > 0) if WOUND in table.layout else False
+    return np.asarray((table["status"] == SETTLED) & (left.reversals == 0) & ~np.asarray(watched))
 
 
 def only(which: Array, left: Ending) -> Ending:
@@ -68,7 +68,7 @@ def endings(table: Table, which: Array) -> Ending:
 
     def find(first: int) -> None:
         some = cells[first : first + _AT_A_TIME]
-        found = ending(form_of(model), *slow_states(Table(table.rows[some], table.layout)))
+        found = ending(form_of(model).full, *_full_states(model, Table(table.rows[some], table.layout)))
         for whole, part in zip(result, found, strict=True):
             whole[some] = part
 
@@ -76,9 +76,8 @@ def endings(table: Table, which: Array) -> Ending:
     return result
 
 
-def slow_states(table: Table) -> tuple[Array, Any]:
-    """States and constants of the stiff form, from state rows of a model with modes in either set of variables."""
-    model = table.layout.model
+def _full_states(model: Model, table: Table) -> tuple[Array, Any]:
+    """States in the full model's variables and constants, of a model with modes in either set of variables."""
     constants = model.constants(*table.columns(constants_of(model)).T)
     states = table.columns(model.states).T
-    return (states if model.states == STATES else stack(form_of(model).momentum(tuple(states), constants))), constants
+    return (velocities(form_of(model).slow, states, constants) if model.states == STATES else states), constants

@@ -15,7 +15,7 @@ from sweep.jit import inline
 from sweep.kernels.layout import LANES, Layout, Table
 from sweep.kernels.measures.measurement import Measurement, measured
 from sweep.models.model import Array, Columns, Model, Offer
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.units import TIME
 
 LATEST = ("newest_reversal", "second_newest_reversal", "third_newest_reversal")

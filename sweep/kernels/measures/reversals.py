@@ -23,7 +23,7 @@ from sweep.kernels.layout import Layout, Table
 from sweep.kernels.measures.measurement import Measurement, Stretch, measured
 from sweep.kernels.status import Doubt
 from sweep.models.model import Array, Columns, Model, Offer
-from sweep.models.stiff.final_spin import Ending
+from sweep.models.slow.estimate import Ending
 from sweep.units import NUMBER, SPIN, TIME
 
 

@@ -26,12 +26,14 @@ still, which leaves out terms of the order of d in units of a frequency.
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 
 from sweep.jit import called, inline
 from sweep.models.model import Model
 from sweep.models.slow.elementary import quotient, square
-from sweep.models.theory.linear import NODES
+from sweep.models.theory.linear import FIT, NODES
 
 # Products of a_1, a_2, a_1*, a_2*, by their exponents; each stands for its conjugate too.  `_MEAN` are the terms of H.
 _LINEAR = np.array([(1, 0, 0, 0), (0, 1, 0, 0)])
@@ -114,9 +116,8 @@ _NEAR = 0.02
 # they change Y by less than `_CLOSE`, and have failed if the last one changes it by more than `_FAR`.
 _ITERATIONS, _CLOSE, _FAR = 24, 1e-13, 1e-6
 
-_FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 _FIT_OF_THREE = np.linalg.inv(NODES[:_THREE, None] ** np.arange(_THREE))
-_SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ _FIT
+_SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ FIT
 """Takes values at `NODES` to the derivative there of the polynomial through them."""
 
 
@@ -225,32 +226,35 @@ def _bend(sums, large, bent):
         bent[k] = (ratio - 1.0) / (_SIZES[_LARGE] ** 2 - ratio * _SIZES[_USUAL] ** 2)
 
 
-def make_exchange(model: Model):
-    """Compiled (p, reach, E, E⁻¹, table, bent) -> (d, followed), which writes the coefficients of a body, and `begin`.
+Body = namedtuple("Body", "p reach")
+"""The constants of a body, and the fastest spin within reach, which is the unit of spins and amplitudes."""
 
-    E is in units of `reach`.  `table`, of shape (5, TERMS), gets the coefficients of the polynomials in the spin, of
-    fourth degree for C and H and of second degree for T and Q; and `bent` the two κ.  `followed` says whether the
-    modes could be followed to all spins.
-    """
+At = namedtuple("At", "n A C Y slope small linear q")
+"""What is found at a spin n: the Jacobian A in the modes at rest, C and Y, the derivative of Y by the spin, E (1 + Y)
+and (1 + Y) C, and the ripple q."""
+
+
+def _make_equations(model: Model):
+    """Compiled functions that evaluate the equations of a model near upright spin: `slowed`, `jacobian`, `evaluate`."""
     rhs, couples = model.rhs, bool(model.variant and model.variant.couples)
 
     @called
-    def slopes_of(x, n, p, reach, slopes):
+    def slopes_of(x, n, body, slopes):
         """Write the slopes at a spin n; rows of `x` and `slopes` are the rattle in the order of `RATTLE`, then ω3."""
         for i in range(x.shape[1]):
-            state = x[0, i], x[1, i], x[2, i], x[3, i], (x[6, i] - n) * reach, x[4, i], x[5, i]
-            rates, _ = rhs(state, p)
+            state = x[0, i], x[1, i], x[2, i], x[3, i], (x[6, i] - n) * body.reach, x[4, i], x[5, i]
+            rates, _ = rhs(state, body.p)
             slopes[0, i], slopes[1, i], slopes[2, i], slopes[3, i], turn, slopes[4, i], slopes[5, i] = rates
-            slopes[6, i] = turn / reach
+            slopes[6, i] = turn / body.reach
 
     @called
-    def slowed(n, p, reach):
+    def slowed(n, body):
         """Return ω3' in upright spin, by couples alone."""
-        rates, _ = rhs((0.0, 0.0, 0.0, 0.0, -n * reach, 0.0, 0.0), p)
-        return rates[4] / reach
+        rates, _ = rhs((0.0, 0.0, 0.0, 0.0, -n * body.reach, 0.0, 0.0), body.p)
+        return rates[4] / body.reach if couples else 0.0
 
     @called
-    def jacobian(n, p, reach, E, inverse, A):
+    def jacobian(n, body, E, inverse, A):
         """Find A in the modes at rest, from slopes of rattles along E so small that only linear terms are left."""
         # Twelve columns are used; sixteen are evaluated as fast, because eight at a time make a vector.
         x, slopes, by_mode = np.zeros((7, 16)), np.empty((7, 16)), np.empty((6, 12))
@@ -258,34 +262,39 @@ def make_exchange(model: Model):
         for i in range(6):
             for k in range(12):
                 x[i, k] = tiny * parts[i, k]
-        slopes_of(x, n, p, reach, slopes)
+        slopes_of(x, n, body, slopes)
         for i in range(6):
             for k in range(12):
                 by_mode[i, k] = slopes[i, k] / tiny
         _product(inverse, by_mode.view(E.dtype), A)
 
     @called
-    def evaluate(level, n, p, reach, shape, q, of_x, of_spin):
+    def evaluate(level, n, body, shape, q, of_x, of_spin):
         """Evaluate the equations at an amplitude, and sum x' by `_OF_X` and ω3' by `_OF_SPIN`.
 
         `shape` is E (1 + Y + w) by states, or without w, of shape (6, 2).
         """
-        points, parts = _POINTS[level], shape.view(np.float64)
+        points, parts, drag = _POINTS[level], shape.view(np.float64), slowed(n, body)
         x, slopes = np.empty((7, points)), np.empty((7, points))
-        drag = slowed(n, p, reach) if couples else 0.0
         for i in range(6):
             _combine(parts[i], _WAVES[level], x[i])
         _combine(q.view(np.float64), _RIPPLES[level], x[6])
-        slopes_of(x, n, p, reach, slopes)
+        slopes_of(x, n, body, slopes)
         for i in range(len(of_x)):
             _combine(slopes[i, : _POINTS_OF_X[level]], _OF_X[level], of_x[i].view(np.float64))
         for i in range(points):
             slopes[6, i] -= drag
         _combine(slopes[6], _OF_SPIN[level], of_spin.view(np.float64))
 
+    return slowed, jacobian, evaluate
+
+
+def _make_linear_terms(evaluate):
+    """Compiled (at, body, E, sums) -> None: finds C, H and the ripple, from A, Y and C."""
+
     @called
-    def linear_terms(n, p, reach, E, C, Y, small, linear, q, sums):
-        """Find C, H and the ripple at one spin; `small` gets E (1 + Y), and `linear` (1 + Y) C."""
+    def linear_terms(at, body, E, sums):
+        n, _, C, Y, _, small, linear, q = at
         basis, of_spin = np.zeros((6, 2), E.dtype), np.empty(6, E.dtype)
         for i in range(2):
             basis[i, i], q[i], q[2] = 1.0, 0.0, 0.0
@@ -293,34 +302,23 @@ def make_exchange(model: Model):
                 basis[k + 2, i] = Y[k, i]
         _product(E, basis, small)
         _product(basis, C, linear)
-        evaluate(_RIPPLE, n, p, reach, small, q, np.empty((0, 1), E.dtype), of_spin)
+        evaluate(_RIPPLE, n, body, small, q, np.empty((0, 1), E.dtype), of_spin)
         for k in range(4):
             sums[k] = C[k // 2, k % 2]
         for k in range(3):
             sums[4 + k], q[k] = of_spin[k], -quotient(of_spin[3 + k], _rate_of(SECOND[k], C))
 
-    @called
-    def resonances(level, n, p, reach, inverse, shape, q, linear, sums):
-        """Find T and Q at an amplitude."""
-        of_x, found = np.empty((6, RESONANT), inverse.dtype), np.empty((2, RESONANT), inverse.dtype)
-        of_spin, per = sums[HIGHER:], _SIZES[level] ** -2
-        evaluate(level, n, p, reach, shape, q, of_x, of_spin)
-        _product(inverse[:2], of_x, found)
-        _without_linear(per, linear, found)
-        for i in range(2):
-            for m in range(RESONANT):
-                sums[LOWEST + i * RESONANT + m] = found[i, m]
-        for k, h in ((0, 4), (1, 4), (1, 5), (2, 5), (3, 6), (4, 6)):  # `_OF_SPIN` leaves H in them
-            of_spin[k] -= per * sums[h]
+    return linear_terms
+
+
+def _make_higher_terms(evaluate):
+    """Compiled functions: `find_shape`, which finds E (1 + Y + w), and `resonances`, which finds T and Q with it."""
 
     @called
-    def higher_terms(n, p, reach, E, inverse, A, C, Y, slope, small, q, linear, shape, sums):
-        """Find T and Q at one spin; `slope` is the derivative of Y by n, and `shape` gets E (1 + Y + w)."""
+    def find_shape(at, body, E, inverse, sums, shape):
+        n, A, C, Y, slope, small, linear, q = at
         of_x, found = np.empty((6, 10), E.dtype), np.empty((6, 10), E.dtype)
-        for i in range(2):
-            for k in range(6):
-                shape[k, i] = small[k, i]
-        evaluate(_CUBIC, n, p, reach, small, q, of_x, np.empty(0, E.dtype))
+        evaluate(_CUBIC, n, body, small, q, of_x, np.empty(0, E.dtype))
         _product(inverse, of_x, found)
         _without_linear(_SIZES[_CUBIC] ** -2, linear, found)
         for m in range(RESONANT):  # Y depends on the spin, which changes
@@ -333,45 +331,80 @@ def make_exchange(model: Model):
         _find_third(A, C, Y, found, of_x)
         _product(E, of_x, found)
         for k in range(6):
-            for m in range(10):
-                shape[k, 2 + m] = found[k, m]
-        resonances(_USUAL, n, p, reach, inverse, shape, q, linear, sums)
+            for m in range(12):
+                shape[k, m] = small[k, m] if m < 2 else found[k, m - 2]
 
     @called
-    def exchange(p, reach, E, inverse, table, bent):
+    def resonances(level, at, body, inverse, shape, sums):
+        of_x, found = np.empty((6, RESONANT), inverse.dtype), np.empty((2, RESONANT), inverse.dtype)
+        of_spin, per = sums[HIGHER:], _SIZES[level] ** -2
+        evaluate(level, at.n, body, shape, at.q, of_x, of_spin)
+        _product(inverse[:2], of_x, found)
+        _without_linear(per, at.linear, found)
+        for i in range(2):
+            for m in range(RESONANT):
+                sums[LOWEST + i * RESONANT + m] = found[i, m]
+        for k, h in ((0, 4), (1, 4), (1, 5), (2, 5), (3, 6), (4, 6)):  # `_OF_SPIN` leaves H in them
+            of_spin[k] -= per * sums[h]
+
+    return find_shape, resonances
+
+
+@called
+def _fit(sums, bent, table):
+    """Write the coefficients of the polynomials through what was found at the spins."""
+    _clear(table)
+    for m in range(TERMS):
+        fit = FIT if m < LOWEST else _FIT_OF_THREE
+        straight = 1.0 if m < LOWEST else 1.0 + bent[m // HIGHER] * _SIZES[_USUAL] ** 2
+        for k in range(len(fit)):
+            for j in range(len(fit)):
+                table[k, m] += straight * fit[k, j] * sums[j, m]
+
+
+def make_exchange(model: Model):
+    """Compiled (body, E, E⁻¹, table, bent) -> (d, followed), which writes the coefficients of a body, and `begin`.
+
+    E is in units of `reach`.  `table`, of shape (5, TERMS), gets the coefficients of the polynomials in the spin, of
+    fourth degree for C and H and of second degree for T and Q; and `bent` the two κ.  `followed` says whether the
+    modes could be followed to all spins.
+    """
+    slowed, jacobian, evaluate = _make_equations(model)
+    linear_terms, (find_shape, resonances) = _make_linear_terms(evaluate), _make_higher_terms(evaluate)
+
+    @called
+    def exchange(body, E, inverse, table, bent):
         A, C, Y = np.empty((5, 6, 6), E.dtype), np.empty((5, 2, 2), E.dtype), np.empty((5, 4, 2), E.dtype)
         sums, slope, q = np.empty((5, TERMS), E.dtype), np.empty((4, 2), E.dtype), np.empty(3, E.dtype)
         small, linear, shape = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
         followed = True
         for k in range(5):
-            jacobian(NODES[k], p, reach, E, inverse, A[k])
+            jacobian(NODES[k], body, E, inverse, A[k])
             followed &= _follow_modes(A[k], Y[k], C[k])
         for k in range(5):
-            linear_terms(NODES[k], p, reach, E, C[k], Y[k], small, linear, q, sums[k])
+            at = At(NODES[k], A[k], C[k], Y[k], slope, small, linear, q)
+            linear_terms(at, body, E, sums[k])
             if k < _THREE:
                 _combine(_SLOPE[k], Y.reshape((5, 8)), slope.reshape(8))
-                n, found = NODES[k], sums[k]
-                higher_terms(n, p, reach, E, inverse, A[k], C[k], Y[k], slope, small, q, linear, shape, found)
+                find_shape(at, body, E, inverse, sums[k], shape)
+                resonances(_USUAL, at, body, inverse, shape, sums[k])
             if k == 0:
                 large = sums[0].copy()
-                resonances(_LARGE, 0.0, p, reach, inverse, shape, q, linear, large)
+                resonances(_LARGE, at, body, inverse, shape, large)
                 _bend(sums[0], large, bent)
-        _clear(table)
-        for m in range(TERMS):
-            fit = _FIT if m < LOWEST else _FIT_OF_THREE
-            straight = 1.0 if m < LOWEST else 1.0 + bent[m // HIGHER] * _SIZES[_USUAL] ** 2
-            for k in range(len(fit)):
-                for j in range(len(fit)):
-                    table[k, m] += straight * fit[k, j] * sums[j, m]
-        return slowed(1.0, p, reach) if couples else 0.0, followed
+        _fit(sums, bent, table)
+        return slowed(1.0, body), followed
 
     @called
-    def begin(x, n, p, reach, E, inverse):
+    def begin(x, n, body, E, inverse):
         """Return the amplitudes a of a rattle x, the spin without the ripple, and `followed` at a spin n."""
-        A, C, Y = np.empty((6, 6), E.dtype), np.empty((2, 2), E.dtype), np.empty((4, 2), E.dtype)
-        small, linear = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype)
-        q, sums = np.empty(3, E.dtype), np.empty(LOWEST, E.dtype)
-        jacobian(n, p, reach, E, inverse, A)
+        A, C, Y, q = (
+            np.empty((6, 6), E.dtype),
+            np.empty((2, 2), E.dtype),
+            np.empty((4, 2), E.dtype),
+            np.empty(3, E.dtype),
+        )
+        jacobian(n, body, E, inverse, A)
         followed = _follow_modes(A, Y, C)
         z1, z2 = 0.0j, 0.0j
         for k in range(6):
@@ -379,7 +412,8 @@ def make_exchange(model: Model):
         a1, a2 = z1, z2
         for _ in range(_ITERATIONS):  # a + Y* a* = z, where these rows of Y belong to the conjugates
             a1, a2 = z1 - np.conj(Y[0, 0] * a1 + Y[0, 1] * a2), z2 - np.conj(Y[1, 0] * a1 + Y[1, 1] * a2)
-        linear_terms(n, p, reach, E, C, Y, small, linear, q, sums)
+        at = At(n, A, C, Y, Y, np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), q)
+        linear_terms(at, body, E, np.empty(LOWEST, E.dtype))
         return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real, followed
 
     return exchange, begin

@@ -1,4 +1,4 @@
-"""Follow the slow equations to their end, and count the reversals on the way.
+"""Follow the slow equations to their end: count the reversals on the way, and find the spin that remains.
 
 Within a step the spin and the coefficients stay as they are in its middle.  The amplitudes then turn and grow as the
 modes of a 2 × 2 matrix do, and their products, which drive the spin, are integrated exactly over the step.  So a step
@@ -10,13 +10,16 @@ computed with the others until another trajectory takes its place.
 
 from __future__ import annotations
 
+from collections import namedtuple
+from functools import cache
+from itertools import pairwise
+
 import numpy as np
 
-from sweep.jit import INTERPRETED, called, full_width, inline
+from sweep.jit import INTERPRETED, Cached, called, full_width, inline, serial
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.slow.elementary import exp, log1p, quotient, square, times, turn_by
 from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS
-from sweep.models.stiff.final_spin import lasts
 
 # With 16 lanes a step takes a fifth longer; with 64, more lanes are idle at the end.
 _LANES = 1 if INTERPRETED else 32
@@ -36,8 +39,9 @@ _BEAT, _ACTS = 1.0, 0.1
 # the spin. To resolve the old modes into the new ones would excite one by the other, which the motion does not do.
 _APART_STEP = 3.0
 
-# It is over when both modes decay and can change the spin by no more than this share; a couple slows the spin by no
-# more than a share `_SLOWED` in a step.
+# It is over when both modes decay and can change the spin by no more than this share.  With a couple, the spin is a sum
+# of decaying terms, its own and one of each mode: it is over when the slowest exceeds the others that much.  A couple
+# slows the spin by no more than a share `_SLOWED` in a step.  There may be more steps if they are shorter than usual.
 _OVER, _MOST_STEPS, _SLOWED = 1e-3, 3000, 0.1
 
 # The equations have failed if the spin exceeds what the energy allows by this factor.
@@ -50,65 +54,93 @@ _DEEPEST = np.log(1e-8)
 # Eigenvalues differ by at least this share of the matrix; the squares of amplitudes may fall below the smallest number.
 _APART, _TINY, _LONG = 1e-6, 1e-300, 1e12
 
-# Where the lanes of each quantity begin in a group; complex numbers take two rows.
-(_Z1, _Z2, _V11, _V12, _V21, _V22, _REST, _BETWEEN, _N, _OLD, _COUNT, _KEEP, _STEP, _STEPS, _STATE, _SIZE, _D,
- _STRONG, _FAR_APART, _BENT_RATES, _BENT_TURN, _E1, _E2, _X, _LOG1, _LOG2, _LOW1, _LOW2, _SUNK, _GROUP) = (
-    _LANES * row for row in (*range(0, 16, 2), *range(16, 38)))  # fmt: skip
-
 _RUNNING, _OVER_NOW, _FAILED = 0.0, 1.0, 2.0
+
+Lane = namedtuple(
+    "Lane",
+    "z1 z2 v11 v12 v21 v22 beat "
+    "n x old count keep step steps state e1 e2 log1 log2 low1 low2 sunk end overshoot nearest "
+    "d size strong bent_rates bent_turn far_apart rest",
+)
+"""What a lane holds of a trajectory: the amplitudes z of two modes, and these modes V; the spin n, and x, the spin at
+which the coefficients are evaluated; the spin without the beat at the last look, and the number of reversals; 1 unless
+each mode keeps its own amplitude; the length of the step, the number of steps, and the state; for a step, the means of
+|a_1|², |a_2|² and a_1 a_2* (e1, e2, beat); for each mode, by how much its logarithm has changed since it last turned
+the spin, and the least of that; whether the mode that turned the spin last had fallen too far; the spin that would
+remain, and the extremes of the last arc.  d, the factor of T and Q, a measure of T, both κ, whether one frequency is
+more than twice the other, and the factor of the beat in the spin stay as they are."""
+
+_COMPLEX, _FIXED = Lane._fields[:7], Lane._fields[-7:]
+
+_ROW = {name: 2 * i for i, name in enumerate(_COMPLEX)}
+_ROW |= {name: len(_COMPLEX) + i for i, name in enumerate(Lane._fields) if name not in _ROW}
+_ROWS = len(_COMPLEX) + len(Lane._fields)
+
+Terms = namedtuple("Terms", "C H T1 T2 Q")
+"""The coefficients of a lane at a spin (`sweep.models.slow.exchange`): C and T in rows."""
 
 
 @inline
-def _get(rows, at, lane):
+def _complex(rows, at, lane):
     return complex(rows[at + lane], rows[at + _LANES + lane])
 
 
-# (s, lane) -> all coefficients of a lane, one by one: a loop over them would need an array, and not be vectorised.
-_SUMS = tuple_of(f"get(s, {at}, lane)" for at in range(0, 2 * TERMS * _LANES, 2 * _LANES))
-_load_sums = compile_inline("load_sums", "s, lane", [f"return {_SUMS}"], {"get": _get})
+def _place(name: str) -> str:
+    """Return the source of a quantity of a lane."""
+    at = _ROW[name] * _LANES
+    return f"of(g, {at}, lane)" if name in _COMPLEX else f"g[{at} + lane]"
+
+
+# Loops over quantities would need arrays, and not be vectorised.
+_load = compile_inline(
+    "load", "g, lane", [f"return Lane{tuple_of(map(_place, Lane._fields))}"], {"Lane": Lane, "of": _complex}
+)
+
+
+def _storing(*names: str):
+    """Inline (g, lane, values) -> None, which sets these quantities of a lane."""
+    lines = list[str]()
+    for i, each in enumerate(names):
+        parts = (".real", ".imag") if each in _COMPLEX else ("",)
+        lines += [f"g[{(_ROW[each] + k) * _LANES} + lane] = values[{i}]{part}" for k, part in enumerate(parts)]
+    return compile_inline("store", "g, lane, values", lines, {})
+
+
+def _make_load_terms():
+    at = [f"of(s, {2 * _LANES * term}, lane)" for term in range(TERMS)]
+    ends = [0, 4, LOWEST, LOWEST + 6, HIGHER, TERMS]
+    parts = (tuple_of(at[begin:end]) for begin, end in pairwise(ends))
+    return compile_inline("load_terms", "s, lane", [f"return Terms{tuple_of(parts)}"], {"Terms": Terms, "of": _complex})
+
+
+_load_terms = _make_load_terms()
 
 
 @inline
-def _put(rows, at, lane, z):
-    rows[at + lane], rows[at + _LANES + lane] = z.real, z.imag
-
-
-@inline
-def _get_modes(g, lane):
-    """The amplitudes z_1 and z_2, and their modes V."""
-    V = (_get(g, _V11, lane), _get(g, _V12, lane), _get(g, _V21, lane), _get(g, _V22, lane))
-    return _get(g, _Z1, lane), _get(g, _Z2, lane), V
-
-
-@inline
-def _put_modes(g, lane, z1, z2, V):
-    _put(g, _Z1, lane, z1)
-    _put(g, _Z2, lane, z2)
-    _put(g, _V11, lane, V[0])
-    _put(g, _V12, lane, V[1])
-    _put(g, _V21, lane, V[2])
-    _put(g, _V22, lane, V[3])
-
-
-@inline
-def _rates(sums, by, e1, e2, beat):
-    """C with T, divided by `by`, for products of the amplitudes: e_1, e_2 and `beat`, which is a_1 a_2*."""
-    back = np.conj(beat)
-    share = 1.0 / by  # a complex division would have to check for zero
+def _row(T, share, products):
+    """Return a row of T, multiplied by `share`, for products of the amplitudes: |a_1|², |a_2|² and a_1 a_2*."""
+    e1, e2, beat = products
     return (
-        sums[0] + times(share, times(e1, sums[7]) + sums[8] * beat + times(e2, sums[10])),
-        sums[1] + times(share, times(e1, sums[9]) + sums[11] * back + times(e2, sums[12])),
-        sums[2] + times(share, times(e1, sums[13]) + sums[14] * beat + times(e2, sums[16])),
-        sums[3] + times(share, times(e1, sums[15]) + sums[17] * back + times(e2, sums[18])),
+        times(share, times(e1, T[0]) + T[1] * beat + times(e2, T[3])),
+        times(share, times(e1, T[2]) + T[4] * np.conj(beat) + times(e2, T[5])),
     )
 
 
 @inline
-def _turning(sums, by, e1, e2, beat):
+def _rates(terms, by, products):
+    """C with T, divided by `by`."""
+    share = 1.0 / by  # a complex division would have to check for zero
+    one, other, C = _row(terms.T1, share, products), _row(terms.T2, share, products), terms.C
+    return C[0] + one[0], C[1] + one[1], C[2] + other[0], C[3] + other[1]
+
+
+@inline
+def _turning(terms, by, products):
     """n' with Q, divided by `by`."""
-    pairs = sums[19].real * e1 * e1 + sums[20].real * e1 * e2 + sums[21].real * e2 * e2
-    pairs += 2.0 * ((times(e1, sums[22]) + times(e2, sums[23]) + sums[24] * beat) * beat).real
-    return sums[4].real * e1 + sums[5].real * e2 + 2.0 * (sums[6] * beat).real + pairs / by
+    (e1, e2, beat), (h1, h2, h12), Q = products, terms.H, terms.Q
+    pairs = Q[0].real * e1 * e1 + Q[1].real * e1 * e2 + Q[2].real * e2 * e2
+    pairs += 2.0 * ((times(e1, Q[3]) + times(e2, Q[4]) + Q[5] * beat) * beat).real
+    return h1.real * e1 + h2.real * e2 + 2.0 * (h12 * beat).real + pairs / by
 
 
 @inline
@@ -172,66 +204,237 @@ def _products(e1, e2, cross, V):
     return first, second, beat + V[0] * np.conj(V[3]) * cross + V[1] * np.conj(V[2]) * np.conj(cross)
 
 
+Resolved = namedtuple("Resolved", "rate1 rate2 z1 z2 V")
+"""The rates at some products of the amplitudes, and the amplitudes in the modes V of these rates."""
+
+
 @inline
-def _grown(step, rate1, rate2):
+def _resolved(at, terms, products):
+    by = (1.0 + at.bent_rates * (products[0] + products[1])) / at.size
+    rate1, rate2, V = _modes(_rates(terms, by, products))
+    z1, z2 = _turned(at.z1, at.z2, (at.v11, at.v12, at.v21, at.v22), V, at.keep)
+    return Resolved(rate1, rate2, z1, z2, V)
+
+
+@inline
+def _turn_of(at, terms, products):
+    """n' at these means of the products of the amplitudes."""
+    return _turning(terms, (1.0 + at.bent_turn * (products[0] + products[1])) / at.size, products)
+
+
+@inline
+def _grown(step, now):
     """Growth factors of both modes in a step, and exp(i φ) for the phase φ by which they part.
 
     Their common phase drives nothing.
     """
-    phase = step * (rate1.imag - rate2.imag)
-    return exp(step * rate1.real), exp(step * rate2.real), turn_by(phase)
+    phase = step * (now.rate1.imag - now.rate2.imag)
+    return exp(step * now.rate1.real), exp(step * now.rate2.real), turn_by(phase)
 
 
 @inline
-def _means(z1, z2, step, rate1, rate2, grown, V):
-    """The means of |a_1|², |a_2|² and a_1 a_2* over a step in which modes of amplitudes z grow."""
+def _means(step, now, grown):
+    """The means of |a_1|², |a_2|² and a_1 a_2* over a step in which the modes grow."""
     g1, g2, turned = grown
-    e1 = square(z1) * _real_mean(g1 * g1, 2.0 * step * rate1.real)
-    e2 = square(z2) * _real_mean(g2 * g2, 2.0 * step * rate2.real)
-    return _products(e1, e2, z1 * np.conj(z2) * _mean(times(g1 * g2, turned), times(step, rate1 + np.conj(rate2))), V)
+    e1 = square(now.z1) * _real_mean(g1 * g1, 2.0 * step * now.rate1.real)
+    e2 = square(now.z2) * _real_mean(g2 * g2, 2.0 * step * now.rate2.real)
+    mean = _mean(times(g1 * g2, turned), times(step, now.rate1 + np.conj(now.rate2)))
+    return _products(e1, e2, now.z1 * np.conj(now.z2) * mean, now.V)
+
+
+Acts = namedtuple("Acts", "f1 f2 h1 h2 h12 both apart cross beating")
+"""What the modes do to the spin: |z|² and H of each; H of both, the rate of their beat, and its frequency; the largest
+part of the beat in n', and in n."""
 
 
 @inline
-def _turns(sums, V):
-    """H in the modes V: of each, and of both."""
-    h1, h2, h12 = sums[4].real, sums[5].real, sums[6]
-    one = h1 * square(V[0]) + h2 * square(V[2]) + 2.0 * (h12 * V[0] * np.conj(V[2])).real
-    other = h1 * square(V[1]) + h2 * square(V[3]) + 2.0 * (h12 * V[1] * np.conj(V[3])).real
-    both = times(h1, V[0] * np.conj(V[1])) + times(h2, V[2] * np.conj(V[3]))
-    both += h12 * V[0] * np.conj(V[3]) + np.conj(h12) * V[2] * np.conj(V[1])
-    return one, other, both
+def _acts(H, now):
+    (h1, h2, h12), V, f1, f2 = H, now.V, square(now.z1), square(now.z2)
+    one = h1.real * square(V[0]) + h2.real * square(V[2]) + 2.0 * (h12 * V[0] * np.conj(V[2])).real
+    other = h1.real * square(V[1]) + h2.real * square(V[3]) + 2.0 * (h12 * V[1] * np.conj(V[3])).real
+    together = times(h1.real, V[0] * np.conj(V[1])) + times(h2.real, V[2] * np.conj(V[3]))
+    together += h12 * V[0] * np.conj(V[3]) + np.conj(h12) * V[2] * np.conj(V[1])
+    both, cross = now.rate1 + np.conj(now.rate2), 2.0 * np.sqrt(square(together) * f1 * f2)
+    apart = abs(now.rate1.imag - now.rate2.imag)
+    return Acts(f1, f2, one, other, together, both, apart, cross, cross / np.sqrt(square(both)))
 
 
 @inline
-def _resolved(g, lane, sums, e1, e2, beat):
-    """The rates at these products of the amplitudes, the amplitudes in the modes of these, and the modes."""
-    z1, z2, V = _get_modes(g, lane)
-    by = (1.0 + g[_BENT_RATES + lane] * (e1 + e2)) / g[_SIZE + lane]
-    rate1, rate2, W = _modes(_rates(sums, by, e1, e2, beat))
-    z1, z2 = _turned(z1, z2, V, W, g[_KEEP + lane])
-    return rate1, rate2, z1, z2, W
+def _lasts(n, r1, r2, d, left1, left2):
+    """Sizes of the most slowly decaying term of the spin, and of the others together."""
+    rest = abs(n + left1 + left2)
+    of_modes = abs(left2) if r2 > r1 else abs(left1)
+    others = rest + (abs(left1) if r2 > r1 else abs(left2))
+    drag = d < min(-2.0 * r1, -2.0 * r2)
+    return abs(n) if drag else of_modes, abs(left1) + abs(left2) if drag else others
 
 
 @inline
-def _turn_of(g, lane, sums, e1, e2, beat):
-    """n' at these means of the products of the amplitudes."""
-    return _turning(sums, (1.0 + g[_BENT_TURN + lane] * (e1 + e2)) / g[_SIZE + lane], e1, e2, beat)
+def _tracked(at, acts, reverses):
+    """Return log1, log2, low1, low2 and sunk after a look."""
+    strong = abs(acts.h1) * acts.f1 >= abs(acts.h2) * acts.f2
+    first, second = reverses & strong, reverses & (not strong)
+    deep = 1.0 if (at.low1 if first else at.low2) < _DEEPEST else 0.0
+    one, other = (0.0 if first else at.log1, 0.0 if first else at.low1), (0.0 if second else at.log2,
+                                                                         0.0 if second else at.low2)  # fmt: skip
+    return one[0], other[0], one[1], other[1], deep if reverses else at.sunk
 
 
 @inline
-def _longest(pace, f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, strong):
-    """The length of a step, with `pace` times the usual changes; h1 and h2 are the sizes of H in the modes."""
-    r1, r2 = rate1.real, rate2.real
+def _course(at, now, acts, spin, far, reverses):
+    """Return the state, the spin that would remain, and overshoot and nearest approach after a look at a spin.
+
+    With a couple, which slows all spins, the nearest approach is the smallest share that |spin| has in the sum of
+    |spin| and of what both modes can still do to it.
+    """
+    r1, r2, turn1, turn2 = now.rate1.real, now.rate2.real, acts.h1 * acts.f1, acts.h2 * acts.f2
+    left1, left2 = -turn1 / (2.0 * r1 + at.d), -turn2 / (2.0 * r2 + at.d)
+    lasting, others = _lasts(at.n, r1, r2, at.d, left1, left2)
+    over = (r1 < 0.0) & (r2 < 0.0) & (others + acts.beating < _OVER * lasting)
+    end = at.n - far + left1 + left2 if at.d == 0.0 else at.n
+    size = abs(end if over else spin)
+    further = reverses | (size >= at.overshoot)
+    overshoot = size if further else at.overshoot
+    able = abs(turn1) / (2.0 * abs(r1) + at.d) + abs(turn2) / (2.0 * abs(r2) + at.d)
+    size = size / (size + able) if at.d > 0.0 else size
+    nearest = size if further | (size < at.nearest) else at.nearest
+    running = at.state == _RUNNING
+    return (
+        _OVER_NOW if running & over else at.state,
+        end if running else at.end, overshoot if running else at.overshoot, nearest if running else at.nearest,
+    )  # fmt: skip
+
+
+@inline
+def _longest(at, now, acts, pace):
+    """The length of a step, with `pace` times the usual changes."""
+    r1, r2, h1, h2, f1, f2 = now.rate1.real, now.rate2.real, abs(acts.h1), abs(acts.h2), acts.f1, acts.f2
+    left = 0.5 * h1 * f1 / abs(r1) + 0.5 * h2 * f2 / abs(r2) + acts.beating
     way = pace * _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(h1, h2, _TINY))
     step = min(_until(way, h1 * f1, r1), _until(way, h2 * f2, r2))
-    step = min(step, _until(way, cross / (1.0 + apart * step), 0.5 * (r1 + r2)))
-    step = min(step, pace * _CHANGE / (max(h1, h2) * min(way, left) + _TINY), pace * _SLOWED / (d + _TINY))
-    acts = 2.0 * strong * np.sqrt(f1 * f2)
-    return min(step, pace * _BEAT / (apart + acts)) if acts > _ACTS * apart else step
+    step = min(step, _until(way, acts.cross / (1.0 + acts.apart * step), 0.5 * (r1 + r2)))
+    step = min(step, pace * _CHANGE / (max(h1, h2) * min(way, left) + _TINY), pace * _SLOWED / (at.d + _TINY))
+    mixed = 2.0 * at.strong * np.sqrt(f1 * f2)
+    return min(step, pace * _BEAT / (acts.apart + mixed)) if mixed > _ACTS * acts.apart else step
+
+
+@inline
+def _without_beat(at, products, now, acts):
+    """The spin without the beat, and the beat in the spin at the present rates."""
+    far = 2.0 * quotient(acts.h12 * now.z1 * np.conj(now.z2), acts.both).real
+    return at.n - (far if at.far_apart > 0.0 else -at.rest * products[2].imag), far
+
+
+def _make_coefficients(wide):
+    """Compiled (t, g, s) -> None: evaluates the coefficients of all lanes at their spins x."""
+    X = _ROW["x"] * _LANES
+
+    @called
+    def coefficients(t, g, s):
+        wide()
+        for k in range(2 * LOWEST):
+            for lane in range(_LANES):
+                x = g[X + lane]
+                value = ((t[4, k, lane] * x + t[3, k, lane]) * x + t[2, k, lane]) * x + t[1, k, lane]
+                s[k * _LANES + lane] = value * x + t[0, k, lane]
+        for k in range(2 * LOWEST, 2 * TERMS):
+            for lane in range(_LANES):
+                x = g[X + lane]
+                s[k * _LANES + lane] = (t[2, k, lane] * x + t[1, k, lane]) * x + t[0, k, lane]
+
+    return coefficients
+
+
+def _make_begin(wide):
+    """Compiled (g, s, pace) -> None: looks at all lanes, chooses a step, and finds the spin in its middle."""
+    store_look = _storing("old", "count", "log1", "log2", "low1", "low2", "sunk", "state", "end", "overshoot",
+                          "nearest")  # fmt: skip
+    store_step = _storing("step", "keep", "e1", "e2", "beat", "x", *_COMPLEX[:6])
+
+    @called
+    def begin(g, s, pace):
+        wide()
+        for lane in range(_LANES):
+            at, terms = _load(g, lane), _load_terms(s, lane)
+            V = at.v11, at.v12, at.v21, at.v22
+            products = _products(square(at.z1), square(at.z2), times(at.keep, at.z1 * np.conj(at.z2)), V)
+            now = _resolved(at, terms, products)
+            acts = _acts(terms.H, now)
+            spin, far = _without_beat(at, products, now, acts)
+            reverses = (at.state == _RUNNING) & (spin * at.old < 0.0)
+            count = at.count + (1.0 if reverses else 0.0)
+            look = (spin, count), _tracked(at, acts, reverses), _course(at, now, acts, spin, far, reverses)
+            store_look(g, lane, look[0] + look[1] + look[2])
+            step = _longest(at, now, acts, pace)
+            grown = _grown(0.5 * step, now)
+            turn = _turn_of(at, terms, _means(0.5 * step, now, grown))
+            middle = (at.n + 0.5 * step * turn) * exp(-0.5 * at.d * step)
+            grown = (grown[0] * grown[0], grown[1] * grown[1], grown[2] * grown[2])
+            keep = 0.0 if acts.apart * step > _APART_STEP else 1.0
+            store_step(g, lane, (step, keep, *_means(step, now, grown), middle, now.z1, now.z2, *now.V))
+
+    return begin
+
+
+def _make_end(wide):
+    """Compiled (g, s, most) -> None: takes the step of all lanes, with the coefficients of its middle.
+
+    A trajectory fails that takes `most` steps.
+    """
+    store = _storing("state", "n", "x", "steps", "log1", "log2", "low1", "low2", *_COMPLEX[:6])
+
+    @called
+    def end(g, s, most):
+        wide()
+        for lane in range(_LANES):
+            at, terms = _load(g, lane), _load_terms(s, lane)
+            now, step = _resolved(at, terms, (at.e1, at.e2, at.beat)), at.step
+            grown = _grown(step, now)
+            n = (at.n + step * _turn_of(at, terms, _means(step, now, grown))) * exp(-at.d * step)
+            steps = at.steps + 1.0
+            log1, log2 = at.log1 + step * now.rate1.real, at.log2 + step * now.rate2.real
+            low1, low2 = log1 if log1 < at.low1 else at.low1, log2 if log2 < at.low2 else at.low2
+            fails = (at.state == _RUNNING) & ((not abs(n) < _FAR) | (steps >= most))
+            amplitudes = times(grown[0], now.z1), times(grown[1], now.z2) * np.conj(grown[2])
+            state = _FAILED if fails else at.state
+            store(g, lane, (state, n, n, steps, log1, log2, low1, low2, *amplitudes, *now.V))
+
+    return end
+
+
+def _make_fill():
+    """Compiled (g, t, lane, table, start, factors) -> None: sets a lane to the beginning of a trajectory."""
+    store = _storing("z1", "z2", "v11", "v22", "keep", "n", "x", *_FIXED)
+
+    @called
+    def fill(g, t, lane, table, start, factors):
+        size, spin, couple = factors[0], factors[3] * start[4], factors[1] * start[5]
+        parts, strong, both = table.view(np.float64), 0.0, table[0, 0] + np.conj(table[0, 3])
+        for j in range(5):
+            for k in range(2 * TERMS):
+                t[j, k, lane] = parts[j, k]
+        for k in range(LOWEST, HIGHER):
+            strong += 0.5 * square(table[0, k])
+        for row in range(_ROWS):
+            g[row * _LANES + lane] = 0.0
+        z1, z2, one = complex(start[0], start[1]), complex(start[2], start[3]), complex(1.0, 0.0)
+        far_apart = 1.0 if table[0, 3].imag > 2.0 * table[0, 0].imag else 0.0
+        rest = -2.0 * table[0, 6].real * both.imag / square(both)
+        fixed = couple, size, size * np.sqrt(strong), start[6], start[7], far_apart, rest
+        store(g, lane, (z1, z2, one, one, 1.0, spin, spin, *fixed))
+
+    return fill
+
+
+FOUND = ("end", "count", "overshoot", "nearest", "sunk")
+"""What is found of a trajectory, in this order, of which `sound` says whether the equations describe the motion to its
+end: the spin that remains, or with a couple the spin when it can no longer reverse; the number of reversals; the
+largest |spin| since the last reversal, or since the beginning; the smallest after that, with a couple in shares
+(`_course`); and whether the mode that turned the spin last had fallen too far before."""
 
 
 def make_follow():
-    """Compiled (tables, starts, cells, factors, counts, sound) -> None: follows the slow equations of `cells`.
+    """Compiled (tables, starts, cells, factors, found, sound) -> None: follows the slow equations of `cells`.
 
     Parameters
     ----------
@@ -240,123 +443,27 @@ def make_follow():
     cells : which of them to follow
     factors : of T and Q, of d, of the changes in a step, and of the start spin: all 1, except to test how much a count
         depends on them
-    counts, sound : get the numbers of reversals of `cells`, and whether the equations describe the motion to its end,
-        where the mode that turns the spin last has not fallen too far before
+    found, sound : of all cells, shapes (cells, `FOUND`) and (cells,)
 
     Changes of sign are those of the spin without its beat, Re H_12 a_1 a_2* / (λ_1 + λ_2*) at rest, of which the part
     that decays is left out: the simulated count is of the ripple-free spin.
     """
     wide = full_width()
+    coefficients, begin, end, fill = _make_coefficients(wide), _make_begin(wide), _make_end(wide), _make_fill()
+    state, rows = _ROW["state"] * _LANES, tuple(_ROW[name] * _LANES for name in FOUND)
 
     @called
-    def coefficients(t, g, s):
-        """The coefficients at a spin."""
-        wide()
-        for k in range(2 * LOWEST):
-            for lane in range(_LANES):
-                x = g[_X + lane]
-                value = ((t[4, k, lane] * x + t[3, k, lane]) * x + t[2, k, lane]) * x + t[1, k, lane]
-                s[k * _LANES + lane] = value * x + t[0, k, lane]
-        for k in range(2 * LOWEST, 2 * TERMS):
-            for lane in range(_LANES):
-                x = g[_X + lane]
-                s[k * _LANES + lane] = (t[2, k, lane] * x + t[1, k, lane]) * x + t[0, k, lane]
-
-    @called
-    def begin(g, s, pace):
-        """Count a reversal, choose a step, and find the spin in its middle."""
-        wide()
-        for lane in range(_LANES):
-            n, d, state, sums = g[_N + lane], g[_D + lane], g[_STATE + lane], _load_sums(s, lane)
-            z1, z2, V = _get_modes(g, lane)
-            e1, e2, beat = _products(square(z1), square(z2), times(g[_KEEP + lane], z1 * np.conj(z2)), V)
-            rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
-            f1, f2, r1, r2, apart = square(z1), square(z2), rate1.real, rate2.real, abs(rate1.imag - rate2.imag)
-            (g1, g2, g12), both, running = _turns(sums, V), rate1 + np.conj(rate2), state == _RUNNING
-            near, far = (_get(g, _REST, lane) * beat).real, 2.0 * quotient(g12 * z1 * np.conj(z2), both).real
-            new = n - (far if g[_FAR_APART + lane] > 0.0 else near)
-            reverses = running & (new * g[_OLD + lane] < 0.0)
-            g[_COUNT + lane] += 1.0 if reverses else 0.0
-            g[_OLD + lane] = new
-            h1, h2, cross = abs(g1), abs(g2), 2.0 * np.sqrt(square(g12) * f1 * f2)
-            first, second = reverses & (h1 * f1 >= h2 * f2), reverses & (h1 * f1 < h2 * f2)
-            # Loads inside a conditional expression would keep the loop from being vectorised.
-            log1, log2, low1, low2 = g[_LOG1 + lane], g[_LOG2 + lane], g[_LOW1 + lane], g[_LOW2 + lane]
-            sunk, low = g[_SUNK + lane], low1 if first else low2
-            deep = 1.0 if low < _DEEPEST else 0.0
-            g[_SUNK + lane] = deep if reverses else sunk
-            g[_LOG1 + lane], g[_LOW1 + lane] = 0.0 if first else log1, 0.0 if first else low1
-            g[_LOG2 + lane], g[_LOW2 + lane] = 0.0 if second else log2, 0.0 if second else low2
-            beating = cross / np.sqrt(square(both))
-            lasting, others = lasts(n, (r1, r2), d, -g1 * f1 / (2.0 * r1 + d), -g2 * f2 / (2.0 * r2 + d))
-            over = (r1 < 0.0) & (r2 < 0.0) & (others + beating < _OVER * lasting)
-            g[_STATE + lane] = _OVER_NOW if running & over else state
-            left = 0.5 * h1 * f1 / abs(r1) + 0.5 * h2 * f2 / abs(r2) + beating
-            step = _longest(pace, f1, f2, rate1, rate2, apart, h1, h2, cross, left, d, g[_STRONG + lane])
-            g[_STEP + lane], g[_KEEP + lane] = step, 0.0 if apart * step > _APART_STEP else 1.0
-            grown = _grown(0.5 * step, rate1, rate2)
-            e1, e2, beat = _means(z1, z2, 0.5 * step, rate1, rate2, grown, V)
-            middle = (n + 0.5 * step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-0.5 * d * step)
-            grown = (grown[0] * grown[0], grown[1] * grown[1], grown[2] * grown[2])
-            g[_E1 + lane], g[_E2 + lane], beat = _means(z1, z2, step, rate1, rate2, grown, V)
-            g[_X + lane] = middle
-            _put(g, _BETWEEN, lane, beat)
-            _put_modes(g, lane, z1, z2, V)
-
-    @called
-    def end(g, s):
-        """Take the step with the coefficients of its middle."""
-        wide()
-        for lane in range(_LANES):
-            sums, step, state = _load_sums(s, lane), g[_STEP + lane], g[_STATE + lane]
-            e1, e2, beat = g[_E1 + lane], g[_E2 + lane], _get(g, _BETWEEN, lane)
-            rate1, rate2, z1, z2, V = _resolved(g, lane, sums, e1, e2, beat)
-            grown = _grown(step, rate1, rate2)
-            e1, e2, beat = _means(z1, z2, step, rate1, rate2, grown, V)
-            n = (g[_N + lane] + step * _turn_of(g, lane, sums, e1, e2, beat)) * exp(-g[_D + lane] * step)
-            steps = g[_STEPS + lane] + 1.0
-            log1, log2 = g[_LOG1 + lane] + step * rate1.real, g[_LOG2 + lane] + step * rate2.real
-            low1, low2 = g[_LOW1 + lane], g[_LOW2 + lane]
-            g[_LOG1 + lane], g[_LOW1 + lane] = log1, log1 if log1 < low1 else low1
-            g[_LOG2 + lane], g[_LOW2 + lane] = log2, log2 if log2 < low2 else low2
-            fails = (not abs(n) < _FAR) | (steps >= _MOST_STEPS)
-            g[_STATE + lane] = _FAILED if (state == _RUNNING) & fails else state
-            g[_N + lane], g[_X + lane], g[_STEPS + lane] = n, n, steps
-            _put_modes(g, lane, times(grown[0], z1), times(grown[1], z2) * np.conj(grown[2]), V)
-
-    @called
-    def fill(g, t, lane, table, start, factors):
-        """Set a lane to the beginning of a trajectory."""
-        size, spin, couple = factors[0], factors[3] * start[4], factors[1] * start[5]
-        parts, strong = table.view(np.float64), 0.0
-        for j in range(5):
-            for k in range(2 * TERMS):
-                t[j, k, lane] = parts[j, k]
-        for k in range(LOWEST, HIGHER):
-            strong += 0.5 * square(table[0, k])
-        for at in range(0, _GROUP, _LANES):
-            g[at + lane] = 0.0
-        _put(g, _Z1, lane, complex(start[0], start[1]))
-        _put(g, _Z2, lane, complex(start[2], start[3]))
-        g[_V11 + lane] = g[_V22 + lane] = g[_KEEP + lane] = 1.0
-        g[_N + lane], g[_X + lane], g[_D + lane] = spin, spin, couple
-        g[_BENT_RATES + lane], g[_BENT_TURN + lane] = start[6], start[7]
-        g[_SIZE + lane], g[_STRONG + lane] = size, size * np.sqrt(strong)
-        g[_FAR_APART + lane] = 1.0 if table[0, 3].imag > 2.0 * table[0, 0].imag else 0.0
-        both = table[0, 0] + np.conj(table[0, 3])
-        g[_REST + _LANES + lane] = -2.0 * table[0, 6].real * both.imag / square(both)
-
-    @called
-    def follow(tables, starts, cells, factors, counts, sound):
-        g, t, s = np.zeros(_GROUP), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
-        whose, following, begun = np.full(_LANES, -1), 0, 0
-        g[_STATE : _STATE + _LANES] = _FAILED
+    def follow(tables, starts, cells, factors, found, sound):
+        g, t, s = np.zeros(_ROWS * _LANES), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
+        whose, following, begun, most = np.full(_LANES, -1), 0, 0, _MOST_STEPS / min(factors[2], 1.0)
+        g[state : state + _LANES] = _FAILED
         while True:
             for lane in range(_LANES):
-                if g[_STATE + lane] != _RUNNING:
+                if g[state + lane] != _RUNNING:
                     if whose[lane] >= 0:
-                        counts[whose[lane]] = g[_COUNT + lane]
-                        sound[whose[lane]] = (g[_STATE + lane] == _OVER_NOW) & (g[_SUNK + lane] == 0.0)
+                        for k in range(len(rows)):
+                            found[whose[lane], k] = g[rows[k] + lane]
+                        sound[whose[lane]] = g[state + lane] == _OVER_NOW
                         whose[lane], following = -1, following - 1
                     if begun < len(cells):
                         cell = cells[begun]
@@ -368,6 +475,12 @@ def make_follow():
                 coefficients(t, g, s)
                 begin(g, s, factors[2])
                 coefficients(t, g, s)
-                end(g, s)
+                end(g, s, most)
 
     return follow
+
+
+@cache
+def compiled_follow() -> Cached:
+    """Compiled `make_follow`, the same for all models."""
+    return serial(make_follow(), "(c16[:, :, ::1], f8[:, ::1], i8[::1], f8[::1], f8[:, ::1], b1[::1])", "follow")

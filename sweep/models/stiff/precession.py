@@ -3,7 +3,7 @@
 The two rocking frequencies of a nearly round body are nearly the same, and its rattle becomes circular: the contact
 point runs round and round, and neither the spin nor the rattle ripples.  Only the little slip that such a motion needs
 takes energy from it, which can last 10⁶ sqrt(c/g).  As the rattle is not small, the slow equations do not describe it
-(`sweep.models.stiff.final_spin`).  But the contact force has no torque about the contact point, so that the angular
+(`sweep.models.slow.estimate`).  But the contact force has no torque about the contact point, so that the angular
 momentum about it along the vertical,
 
     d (M·u)/dt = h (S12 (ω1² - ω2²) - (S11 - S22) ω1 ω2),

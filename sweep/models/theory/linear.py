@@ -1,6 +1,7 @@
 """A small rattle about steady upright spin, from the right-hand side of a model itself.
 
-At constant n it obeys a linear system.  `sweep.models.theory.stability` finds the spins at which it grows.
+At constant n it obeys a linear system.  `sweep.models.theory.modes` resolves it, and `sweep.models.theory.stability`
+finds the spins at which it grows.
 """
 
 from __future__ import annotations
@@ -10,9 +11,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sweep.models.model import Array, Columns, Model, stack
-
-# Amplitude at which the change of the spin is evaluated: the terms beyond its quadratic form are 1e-16 of it.
-_SMALL = 1e-8
 
 # Columns of a Jacobian that are computed in one call, times cells: few calls for few cells, and many stay in the cache.
 _TOGETHER = 1024
@@ -43,49 +41,6 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
 def growth_rate(model: Model, constants, spin: Array) -> Array:
     """Largest real part of the rattle's eigenvalues, in sqrt(g/c), shape (cells,): positive where the rattle grows."""
     return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
-
-
-def resting_spin(model: Model, constants, states: Array) -> Array:
-    """Return the spin that remains when the rattle has decayed at its present rates, in sqrt(g/c), shape (cells,).
-
-    With the rattle x in the modes of x' = A x, and the spin's state changing by the quadratic form Q of x, the integral
-    of Q is -Σ Q_jk z_j z_k/(λ_j + λ_k) over all pairs of modes: exact to second order in x, except for the change of A
-    with the spin.  NaN where a mode does not decay.
-
-    Parameters
-    ----------
-    states : of `model`, shape (states, cells)
-    """
-    spin, _, _ = model.energy(tuple(states), constants)
-    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
-    rates, modes = np.linalg.eig(jacobian(model, constants, spin))
-    amplitudes = np.linalg.solve(modes, states[rattle].T[..., None])[..., 0]
-    pairs = amplitudes[:, :, None] * amplitudes[:, None, :] / (rates[:, :, None] + rates[:, None, :])
-    change = -(pairs * _form(model, constants, spin, modes)).sum(axis=(1, 2)).real
-    end = (states[model.spin_state] + change) * model.upright(1.0)[model.spin_state]
-    return np.asarray(np.where(rates.real.max(axis=1) < 0, end, np.nan))
-
-
-def _form(model: Model, constants, spin: Array, modes: Array) -> Array:
-    """Return how rattles in `modes` change the spin's state, a quadratic form, by polarisation; shape (cells, m, m)."""
-    rattle = [i for i in range(len(model.states)) if i != model.spin_state]
-    upright, vectors = stack(model.upright(spin)).astype(complex)[:, None, None], np.moveaxis(modes, 0, -1)
-    found = []
-    for both in (vectors[:, :, None] + vectors[:, None, :], vectors[:, :, None] - vectors[:, None, :]):
-        states = np.repeat(np.repeat(upright, modes.shape[2], axis=1), modes.shape[2], axis=2)
-        states[rattle] += _SMALL * both
-        found.append(model.rhs(tuple(states), constants)[0][model.spin_state])
-    return np.moveaxis((found[0] - found[1]) / (4 * _SMALL**2), -1, 0)
-
-
-def rocking_rates(model: Model, constants, spin: Array) -> Array:
-    """Re λ of the two modes of highest frequency, the slower first, in sqrt(g/c), shape (2, cells).
-
-    In a model with slip these are the two rocking modes.
-    """
-    values = np.linalg.eigvals(jacobian(model, constants, spin))
-    order = np.argsort(-values.imag, axis=1)[:, 1::-1]
-    return np.take_along_axis(values.real, order, axis=1).T
 
 
 def fastest_motion(model: Model, columns: Columns) -> Array:
@@ -124,7 +79,8 @@ NODES = np.array([0.0, -1.0, 1.0, -0.5, 0.5])
 With three spins, rates were off by half at b = 6, where the modes nearly meet.
 """
 
-_FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
+FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
+"""Takes values at `NODES` to the coefficients of the polynomial through them, lowest power first."""
 
 
 def through_nodes(values: Array) -> Array:
@@ -132,4 +88,4 @@ def through_nodes(values: Array) -> Array:
 
     This is not a matrix product, because the rounding of a cell by BLAS depends on the number of cells.
     """
-    return np.stack([sum(w * each for w, each in zip(row, values, strict=True)) for row in _FIT])
+    return np.stack([sum(w * each for w, each in zip(row, values, strict=True)) for row in FIT])
