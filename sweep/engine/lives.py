@@ -148,7 +148,8 @@ class Lives:
                     table["goal"], self.notes["leg"][which] = table["steps"], LATER
                 self.rows[which] = table.rows
             case Approach():
-                goal = np.maximum(self.table["done"][which] - AHEAD, 0)
+                # A failure with fewer steps before it is followed from the start (`failures.met`).
+                goal = np.maximum(self.table["done"][which] - AHEAD, 1)
                 self._run_again(which, APPROACH, self.take(which).start(), goal=goal)
             case Second(step, t_end, settles):
                 self._run_again(which, SECOND, self.take(which).start(step, t_end), settles=settles)
