@@ -107,6 +107,12 @@ class Source:
         """The sentences that describe the variables, by their words."""
         return {self.words(name): str(self.cell[name].attrs.get("description", "")) for name in self.variables}
 
+    @cached_property
+    def _notes(self) -> dict[str, str]:
+        """The words for a cell of each kind."""
+        endless = "status" in self.dataset and marks.never_settles(self.dataset)
+        return marks.WORDS | ({"time_limit": marks.UNBOUNDED} if endless else {})
+
     def label(self, name: str) -> str:
         """Return the words with the unit."""
         return labels.label(self.cell, name) if name in self.cell.variables else self.words(name)
@@ -140,8 +146,9 @@ class Source:
         cell = quantities.with_derived(self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load())
         values = {self.words(n): self._value(cell, n) for n in self.variables}
         kinds = marks.marks(cell, self.variables[0])
-        if notes := [marks.WORDS[kind] for kind, where in kinds.items() if bool(np.any(where)) and kind != "no_value"]:
-            values["note"] = "; ".join(notes)
+        here = [kind for kind, where in kinds.items() if bool(np.any(where)) and kind != "no_value"]
+        if here:
+            values["note"] = "; ".join(self._notes[kind] for kind in here)
         return values
 
     def _value(self, cell: xr.Dataset, name: str) -> str:

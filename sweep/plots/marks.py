@@ -93,13 +93,17 @@ def with_results(dataset: xr.Dataset, name: str) -> Array:
     return np.asarray(values.values[~np.any([where.values for where in blank], axis=0)])
 
 
+def never_settles(dataset: xr.Dataset) -> bool:
+    """Return whether no cell has settled, as in a model that cannot: its counts grow with the time limit for ever."""
+    return not (dataset["status"] == SETTLED).any()
+
+
 def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:
     """Return the meaning of a kind of cell for a variable, in words."""
     if kind == "failed":
         codes, counts = np.unique(dataset["status"].values, return_counts=True)
         ends = [f"{n} {STATUS_WORDS[c]}" for c, n in zip(codes.tolist(), counts.tolist(), strict=True) if c in FAILURES]
         return f"failed: {', '.join(ends)}"
-    words = of(name).words.get(kind, WORDS[kind])
-    # What a model that never settles counts has no upper bound that a longer trajectory would reach.
-    endless = kind == "time_limit" and not (dataset["status"] == SETTLED).any()
-    return UNBOUNDED if endless else words
+    if kind == "time_limit" and never_settles(dataset):
+        return UNBOUNDED
+    return of(name).words.get(kind, WORDS[kind])

@@ -13,7 +13,7 @@ import sweep
 from sweep.explorer import slices, state
 from sweep.explorer.slices import PlacedAxis, Source, open_source
 from sweep.faults import FileError
-from sweep.kernels.status import LIFT_OFF
+from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 
 
 @pytest.mark.parametrize(("x", "y"), list(permutations(("mu", "b", "n0"), 2)))
@@ -141,3 +141,10 @@ def test_the_ends_of_a_scale_are_those_of_all_maps_and_of_all_counts(source: Sou
         assert (ends.min(), ends.max()) == (low, high)
     spins = opened["spin_final"].where(opened["status"] != LIFT_OFF)
     assert source.extremes("spin_final").tolist() == [spins.min(), spins.max()]
+
+
+def test_a_cell_of_a_model_that_never_settles_has_no_lower_bound(opened: xr.Dataset) -> None:
+    endless = Source(opened.assign(status=xr.full_like(opened["status"], TIME_LIMIT)))
+    note = endless.values_at({"mu": 2, "b": 0, "n0": 1})["note"]
+    assert "followed up to the time limit" in note
+    assert "lower bound" not in note
