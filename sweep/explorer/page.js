@@ -152,7 +152,8 @@ const sweep = (() => {
   function announce(i, j) {
     const {cuts, cells, blank, figure, ex} = current
     const k = j * (ex.length - 1) + i, value = cells.data.image[0][k]
-    const words = cuts[0].plot.left[0].major_label_overrides.get(value) ?? number(value)
+    const flags = cuts[0].plot.left[0].major_label_overrides  // a Map, or an object once the server has changed it
+    const words = (flags instanceof Map ? flags.get(value) : flags[value]) ?? number(value)
     const place = cuts.map(({symbol, values}, n) => `${symbol} = ${number(values[n ? j : i])}`).join(", ")
     const known = !(cells.data.kinds[0][k] & blank) && Number.isFinite(value)
     document.querySelector("#said").textContent = `${figure.title.text}: ${known ? words : "no value"}, at ${place}`

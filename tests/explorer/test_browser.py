@@ -630,7 +630,8 @@ def test_a_screen_reader_has_names_and_short_news(clicked: Page, counts: np.ndar
     for name in ("Box Zoom", "Reset", "Save"):
         assert clicked.get_by_role("button", name=name, exact=True).count() >= 1, name
     clicked.locator("#map").focus()
-    clicked.keyboard.press("ArrowRight")
+    for key in ("Shift+ArrowLeft", "Shift+ArrowDown", "ArrowRight"):
+        clicked.keyboard.press(key)
     first = clicked.locator("#said").inner_text()
     clicked.keyboard.press("ArrowUp")
     second = clicked.locator("#said").inner_text()
