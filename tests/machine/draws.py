@@ -23,6 +23,7 @@ from sweep.config.distributions import FAMILIES
 from sweep.config.schema import PATHS, schema_of
 from sweep.faults import Fault
 from sweep.kernels.measures import MEASURES, chosen
+from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.methods import AUTO, automatic, cheapest
 from sweep.models import TIERS
 from sweep.parameters import PARAMETERS, Parameter
@@ -218,7 +219,7 @@ def kernels(config: Config) -> set[Piece]:
 
 def compiled(specs: Iterable[str]) -> tuple[str, ...]:
     """Those of the measurements that are made in a kernel."""
-    return tuple(each.spec for each in chosen(specs) if each.in_kernel)
+    return tuple(each.spec for each in chosen(specs) if isinstance(each, Measurement))
 
 
 def steps(config: Config) -> float:
