@@ -87,7 +87,7 @@ class Quantity:
         return np.asarray(self.value)
 
 
-PINT: pint.UnitRegistry[float] = pint.UnitRegistry()
+PINT = pint.UnitRegistry()
 
 GIVEN: dict[str, tuple[str, Any, list[float]]] = {
     "pint": ("b", PINT.Quantity(3, "cm"), [0.03]),
