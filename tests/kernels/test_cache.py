@@ -81,7 +81,7 @@ def edit(file: Path, old: str, new: str) -> None:
 def test_a_typo_in_a_hook_is_named_in_two_lines(copy: Path) -> None:
     margin = copy / "sweep" / "kernels" / "measures" / "margin.py"
     lines = margin.read_text(encoding="utf-8").splitlines()
-    line = lines.index("        def look(group, lane, seen):") + 2
+    line = lines.index("        def check(group, lane, seen):") + 2
     lines.insert(line - 1, "            gruop[0] = 1.0")
     margin.write_text("\n".join(lines), encoding="utf-8")
     scene = ["-m", "sweep", "run", ROOT / "configs" / "quick.yaml", "--quiet", "--set", "integrator.method=dopri5"]
