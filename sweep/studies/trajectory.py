@@ -299,7 +299,8 @@ def _sample(kernel: Kernel, marks: Marks, ends: Array, times: Array, angles: Arr
     def look(samples: Array, rows: Array) -> None:
         _go_on(kernel, rows, times[at[samples]])
         states[:, samples] = kernel.states(rows)
-        put(_series(kernel, rows, angles[which[samples]]), samples)
+        with np.errstate(over="ignore", invalid="ignore"):  # just before a trajectory diverges
+            put(_series(kernel, rows, angles[which[samples]]), samples)
 
     waiting, most = list[tuple[Array, Array]](), counts.max()
     for i in range(most):

@@ -134,6 +134,16 @@ def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
     assert float(one.table_x[0]) == float(one.heading[0]) == 0
 
 
+def test_the_last_samples_before_a_trajectory_diverges_give_no_warning() -> None:
+    """The energy of some of them overflows.  Found by tests/machine."""
+    body = {"a": 10, "b": 3, "c": 0.51, "delta": 0.06}
+    start = {"n0": 0.3, "x0": np.linspace(0.015, 0.025, 12).tolist(), "y0": 0.01}
+    settings = {"t_end": 300.0, "method": "dopri5", "tolerance": 1e-4}
+    config = {"model": "effective", "body": body, "start": start, "friction": {"mu": 20.01}, "integrator": settings}
+    found = sweep.trajectory(config)
+    assert found.sweep.diverged.any()
+
+
 def test_a_body_of_unknown_shape_is_not_drawn(write: Write) -> None:
     """A user's model has the attitude of a rigid body, and dimensions of its own."""
     other = sweep.trajectory(write(STANDARD), mu=60, t_end=60.0).rename({"a": "a1"})
