@@ -136,8 +136,8 @@ def test_a_trajectory_that_diverges_at_once_has_its_start(write: Write) -> None:
 
 def test_the_last_samples_before_a_trajectory_diverges_give_no_warning() -> None:
     """The energy of some of them overflows.  Found by tests/machine."""
-    body = {"a": 10, "b": 3, "c": 0.51, "delta": 0.06}
-    start = {"n0": 0.3, "x0": np.linspace(0.015, 0.025, 12).tolist(), "y0": 0.01}
+    body = {"a": 10, "b": 3, "c": 0.51, "delta": [0.06, 0.033]}
+    start = {"n0": 0.3, "x0": np.linspace(0.015, 0.025, 24).tolist(), "y0": 0.01}
     settings = {"t_end": 300.0, "method": "dopri5", "tolerance": 1e-4}
     config = {"model": "effective", "body": body, "start": start, "friction": {"mu": 20.01}, "integrator": settings}
     found = sweep.trajectory(config)
