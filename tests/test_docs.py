@@ -96,8 +96,9 @@ def _written(text: str, folder: Path, block: Block) -> Path:
     return path
 
 
-_LOOKED_AT = {"explore"}
-"""Pages whose pictures are looked at by a person: a browser draws them, with trajectories that run meanwhile."""
+_LOOKED_AT = {"explore", "check"}
+"""Pages that a person looks at: a browser draws pictures of trajectories that run meanwhile; and a map of errors shows
+cells that round-off decides, which differ between types of CPUs."""
 
 _VARYING = re.compile(
     r"\d[\d.]*( to \d[\d.]*)? (s|min|ms|h|MiB|MB|trajectories/s)\b|\d[\d.]*e[-+]?\d+|\d+\.\d+\.\d+|20\d\d-\d\d-\d\d\S*"
@@ -115,7 +116,8 @@ def test_what_a_page_shows_is_what_its_code_gives(page: Path, tmp_path: Path) ->
     shown, found = (_VARYING.sub("some", each) for each in (page.read_text(encoding="utf-8"), text))
     assert _NUMBER.sub("#", shown) == _NUMBER.sub("#", found)
     numbers = [[float(number) for number in _NUMBER.findall(each)] for each in (shown, found)]
-    assert numbers[0] == pytest.approx(numbers[1], rel=0.05)
+    # On another type of CPU a late reversal, or one cell, may be counted otherwise.
+    assert numbers[0] == pytest.approx(numbers[1], rel=0.05, abs=1)
     for drawn in tmp_path.iterdir():
         stored = ROOT / "docs" / "_static" / drawn.name
         # Letters may be rendered a little differently.
