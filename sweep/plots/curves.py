@@ -62,7 +62,11 @@ def draw(panels: Panels, frames: Frames, limits: Limits = AUTO) -> list[Artist]:
             own.draw(axes, chosen, x)
             entries |= {str(handle.get_label()): handle for handle in axes.get_legend_handles_labels()[0]}
         if limits != AUTO:
-            axes.set_ylim(ends(limits, *axes.get_ylim()))
+            low, high = axes.get_ylim()
+            first, last = ends(limits, low, high)
+            # The only limit may be the other end of all values.
+            room = (high - low) * (first == last)
+            axes.set_ylim(first - room * (limits[0] is None), last + room * (limits[1] is None))
     return list(entries.values())
 
 

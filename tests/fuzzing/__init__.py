@@ -175,7 +175,8 @@ def invoke(*line: str) -> int:
     result = CliRunner().invoke(main, line)
     if result.exception and not isinstance(result.exception, SystemExit):
         raise Violation(f"{line}: {result.exception!r:.500}") from result.exception
-    lines = [line for line in result.stderr.splitlines() if "━" not in line]  # without bars of progress
+    # Without progress.
+    lines = [line for line in result.stderr.splitlines() if "━" not in line and not line.startswith("compiling")]
     helps = lines and (lines[0].startswith("Usage: ") or all(": " in line and len(line) < 1500 for line in lines))
     if result.exit_code not in (0, 2, 3) or (result.exit_code == 2 and (result.stdout or not helps)):
         raise Violation(f"{line}: {result.exit_code} {result.stdout!r:.300} {result.stderr!r:.600}")
