@@ -64,9 +64,9 @@ def draw(panels: Panels, frames: Frames, limits: Limits = AUTO) -> list[Artist]:
         if limits != AUTO:
             low, high = axes.get_ylim()
             first, last = ends(limits, low, high)
-            # The only limit may be the other end of all values.
-            room = (high - low) * (first == last)
-            axes.set_ylim(first - room * (limits[0] is None), last + room * (limits[1] is None))
+            if first == last:  # the only limit is the other end of all values
+                first, last = (first - (high - low), last) if limits[0] is None else (first, last + (high - low))
+            axes.set_ylim(first, last)
     return list(entries.values())
 
 
