@@ -8,10 +8,10 @@ import pytest
 
 from sweep import units
 from sweep.parameters import PARAMETERS, Parameter
-from sweep.results.dataset import VARIABLES
+from sweep.results.dataset import SERIES, VARIABLES
 from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES
-from sweep.studies.trajectory import SERIES
+from sweep.studies import trajectory
 from sweep.units import PAPER_UNITS, SI, WRITTEN, Unit, factor, named, pretty, quantity
 from sweep.variables import Variable
 
@@ -20,7 +20,8 @@ UNITS = {name: unit for name, unit in vars(units).items() if isinstance(unit, Un
 
 RECORDS: dict[str, Parameter | Variable] = {
     **PARAMETERS, **VARIABLES, **PROBABILITIES, **POINTS,
-    **{name: Variable("float64", *each) for name, each in SERIES.items()},
+    **{name: Variable("float64", *each) for name, each in trajectory.SERIES.items()},
+    **SERIES,
 }  # fmt: skip
 
 

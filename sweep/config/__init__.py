@@ -131,12 +131,13 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     parameters = _parameters(model, given, columns, known, physics)
     rattleback = not origin or loading.law(origin) is not None
     numbers = {name: value.numbers for name, value in parameters.items()} | columns
+    measure = tuple(measures.default(model) if values.measure is None else values.measure)
     config = Config(
         name=values.name,
         model=values.model,
         parameters=parameters,
-        integrator=_integrator(values, model, numbers if physics.units == SI and rattleback else {}),
-        measure=tuple(measures.default(model) if values.measure is None else values.measure),
+        integrator=_integrator(values, model, measure, numbers if physics.units == SI and rattleback else {}),
+        measure=measure,
         max_failed_fraction=values.max_failed_fraction,
         picture=_pictures(values, source),
         cases=columns,
@@ -226,15 +227,20 @@ def values_at(config: Config, at: Mapping[str, Any]) -> dict[str, Values]:
     return {name: values_of(config.table[name], value, config.unitless, "at") for name, value in at.items()}
 
 
-def _integrator(values: Any, model: Tier, in_si: Mapping[str, tuple[float, ...]]) -> Integrator:
+def _integrator(
+    values: Any, model: Tier, measure: tuple[str, ...], in_si: Mapping[str, tuple[float, ...]]
+) -> Integrator:
     """Fill in the settings of the integrator whose defaults depend on other settings.
 
     `in_si` holds the values of all parameters if they are in SI; the default time is then in seconds.
     """
     integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
     if "method" not in said:
-        choice = isinstance(model, Model) and len(methods.automatic(model)) > 1 and integrator.step == "auto"
+        choice = isinstance(model, Model) and len(methods.automatic(model, measure)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice else methods.PLAIN
+    if "stop_early" not in said and not all(each.settles for each in measures.chosen(measure)):
+        found["stop_early"] = integrator.t_end >= schema.FOREVER
+        said = {*said, "stop_early"}
     if "t_end" not in said:
         found["t_end"] = usual = _longest(schema.T_END, in_si)
         if Offer.ENDING in model.offers and ("stop_early" not in said or integrator.first_leg):

@@ -110,9 +110,11 @@ def _of_integrator(config: Config) -> Iterator[Misfit]:
     model, integrator = config.tier, config.integrator
     if not isinstance(model, Model):
         return
-    usable = (*methods.allowed(model), methods.AUTO)
+    usable = (*methods.allowed(model, config.measure), methods.AUTO)
     if integrator.method not in usable:
-        yield ("integrator", "method"), f"cannot run the {model.name} model; choose {either(usable)}"
+        able = integrator.method in methods.allowed(model)
+        cannot = f"make all of {', '.join(config.measure)} on" if able else "run"
+        yield ("integrator", "method"), f"cannot {cannot} the {model.name} model; choose {either(usable)}"
     if integrator.method == methods.AUTO and integrator.step != "auto":
         yield ("integrator", "step"), "must be auto with method: auto; or choose a method"
 

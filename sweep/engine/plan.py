@@ -96,7 +96,7 @@ def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
     """Return the kernels that run the cells of `chosen`, or all that a run may need."""
     method = config.integrator.method
     names = [each.kernel.method for each in chosen] or (
-        methods.automatic(config.equations) if method == AUTO else [method]
+        methods.automatic(config.equations, config.measure) if method == AUTO else [method]
     )
     return [kernel_of(name, config) for name in dict.fromkeys(names)]
 
@@ -120,7 +120,7 @@ def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
         return (Choice(kernels(config)[0], possible, columns, np.empty(0), np.empty(0)),)
     tolerance = np.concatenate([first_tolerance(config, grid) for grid in grids])[possible]
     if integrator.method == AUTO:
-        chosen, steps, rules = methods.cheapest(model, columns, tolerance, integrator.t_end)
+        chosen, steps, rules = methods.cheapest(model, columns, tolerance, integrator.t_end, config.measure)
     else:
         chosen = np.full(len(possible), integrator.method)
         steps, rules = steps_of(integrator.method, config, columns, tolerance)

@@ -19,7 +19,7 @@ from sweep.jit import Cached, inline, parallel, threads
 from sweep.kernels.codegen import all_true, any_true, call_all, make_load
 from sweep.kernels.lanes import make_advance, make_check
 from sweep.kernels.layout import STABLE, Layout, Table, constants_of
-from sweep.kernels.measures.measurement import Kind, Measurement, Step
+from sweep.kernels.measures.measurement import Kind, Measurement, Sample, Step
 from sweep.models.model import NO_RIPPLE, Array, Columns, Model, stack
 from sweep.models.theory.stability import StableRanges
 
@@ -97,6 +97,10 @@ class Stepper:
     def steps_in(self, model: Model) -> Model:
         """Return a model in the variables in which it steps."""
         return model
+
+    def makes(self, kind: Kind, model: Model) -> bool:
+        """Return whether a measurement can follow its steps in a model that it runs."""
+        return (self.takes_every_step or not kind.every_step) and {*kind.reads} <= {*self.steps_in(model).states}
 
     def accurate_step(
         self, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: float | Array
@@ -260,6 +264,15 @@ class Kernel:
         """Return the states, shape (states, cells), and the constants by name, each of shape (cells,)."""
         table = self.table(rows)
         return self.states(rows), self.model.constants(*(table[name] for name in self.constants))
+
+    def sampled(self, rows: Array) -> dict[str, Array]:
+        """Return the spin and the series of the measurements, by name, each of shape (cells,)."""
+        spin, rattle, inertia = self.model.energy(*self.unpack(rows))
+        steady = self.steady_spin(rows) if self.ripple else spin
+        seen, found = Sample(spin, steady, rattle + 0.5 * inertia * spin**2), {"spin": spin}
+        for each in self.measurements:
+            found |= each.sample(self.table(rows), seen)
+        return found
 
     def steady_spin(self, rows: Array) -> Array:
         """Return the ripple-free spin of the rows, shape (cells,); the spin itself if no measurement needs that."""

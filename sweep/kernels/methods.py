@@ -23,22 +23,29 @@ AUTO = "auto"
 """Stands in for the name of a method: the cheapest is chosen for each cell."""
 
 
-def allowed(model: Model) -> tuple[str, ...]:
-    """Names of the methods that can integrate a model."""
-    return tuple(name for name, method in METHODS.items() if method.runs(model))
+def allowed(model: Model, measure: Iterable[str] = ()) -> tuple[str, ...]:
+    """Names of the methods that can integrate a model and make measurements, given by their specs."""
+    kinds = measures.chosen(measure)
+    return tuple(
+        name
+        for name, method in METHODS.items()
+        if method.runs(model) and all(method.makes(each, model) for each in kinds)
+    )
 
 
-def automatic(model: Model) -> tuple[str, ...]:
-    """Names of the methods among which `auto` chooses for a model."""
-    return tuple(name for name in allowed(model) if METHODS[name].automatic)
+def automatic(model: Model, measure: Iterable[str] = ()) -> tuple[str, ...]:
+    """Names of the methods among which `auto` chooses for a model and for measurements."""
+    return tuple(name for name in allowed(model, measure) if METHODS[name].automatic)
 
 
-def cheapest(model: Model, columns: Columns, tolerance: Tolerance, t_end: float) -> tuple[Array, Array, Array]:
+def cheapest(
+    model: Model, columns: Columns, tolerance: Tolerance, t_end: float, measure: Iterable[str] = ()
+) -> tuple[Array, Array, Array]:
     """Choose the method that reaches `t_end` within `tolerance` in the least time, with its automatic step.
 
     Returns the names of the methods, with the step and rule of `automatic_step`, each of shape (cells,).
     """
-    rates, names = (fastest_motion(model, columns), model.fastest_decay(columns)), automatic(model)
+    rates, names = (fastest_motion(model, columns), model.fastest_decay(columns)), automatic(model, measure)
     found = [_step(METHODS[name], model, columns, *rates, tolerance) for name in names]
     with np.errstate(divide="ignore"):  # at hardly any friction a method may have no step at all
         costs = [METHODS[name].step_cost * (t_end / step + METHODS[name].start_up_cost)

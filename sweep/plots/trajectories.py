@@ -18,7 +18,7 @@ from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
 from sweep.plots.figure import Sheet, is_column, panel_width, zero_line
-from sweep.results.dataset import TRAJECTORIES, along_one
+from sweep.results.dataset import SERIES, TRAJECTORIES, along_one
 from sweep.results.kind import is_of_own_body, parameters
 
 # Titles, and the series drawn together; panels are in pairs.
@@ -71,9 +71,10 @@ def draw(dataset: xr.Dataset, variable: str | None = None) -> Sheet:
         raise fault_of(f"there is no series {variable}; choose {', '.join(series)}", "variable")
     alone = variable is not None or SAMPLE in dataset.coords or is_column()
     panels = [panel for panel in _PANELS if not panel[1].keys() - dataset.data_vars.keys() and not alone]
-    if is_of_own_body(dataset) and not alone:
+    if not alone:
         known = {"spin", "ripple_free_spin", *(name for _, names in _PANELS for name in names)}
-        panels += [(labels.words(dataset, name), {name: name}) for name in series if name not in known]
+        further = [name for name in series if name not in known and (is_of_own_body(dataset) or name in SERIES)]
+        panels += [(labels.words(dataset, name), {name: name}) for name in further]
     rows = -(-len(panels) // 2)
     figure = Sheet(constants_apart(dataset), panel_width(1, 11, 0), 4.2 + 1.9 * rows)
     grid = figure.add_gridspec(1 + rows, 2, height_ratios=[2] + [1] * rows)

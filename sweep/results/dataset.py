@@ -127,6 +127,10 @@ VARIABLES: dict[str, Variable] = {
 }  # fmt: skip
 
 
+SERIES: dict[str, Variable] = {name: spec for kind in measures.MEASURES.values() for name, spec in kind.series.items()}
+"""The series that measurements add to a trajectory."""
+
+
 def measured(kernel: Kernel, rows: Array, t_end: float | Array, left: Ending | None = None) -> dict[str, Array]:
     """Return the simulated variables from final state rows, of shape (cells,) or (cells, length).
 

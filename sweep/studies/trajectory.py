@@ -72,7 +72,6 @@ MAX_SAMPLES = 10_000_000
 # name: units, long_name, and perhaps a description
 SERIES: dict[str, tuple[Unit, str] | tuple[Unit, str, str]] = {
     "spin": (u.SPIN, "spin n", "Spin about the upward normal."),
-    "ripple_free_spin": (u.SPIN, "spin n without ripple", "Spin without the ripple of the rattle."),
     "contact_x": (u.LENGTH, "contact point along x"),
     "contact_y": (u.LENGTH, "contact point along y"),
     "heading": (u.ANGLE, "heading", "Angle by which the body has turned about the upward normal."),
@@ -91,9 +90,8 @@ SERIES: dict[str, tuple[Unit, str] | tuple[Unit, str, str]] = {
     "amplitude_2": (u.NUMBER, "amplitude B of the second mode", "Averaged amplitude of the second mode."),
     "mode_1": (u.NUMBER, "normal coordinate X"),
     "mode_2": (u.NUMBER, "normal coordinate Y"),
-    "energy": (u.ENERGY_PER_MASS, "energy above rest per mass"),
-    "dissipated": (u.ENERGY_PER_MASS, "work against friction per mass"),
 }
+"""The series that models show; those of measurements follow them."""
 
 _VECTORS = (("contact_x", "contact_y"), ("slip_1", "slip_2"))
 
@@ -172,10 +170,10 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
 
 
 def _described(grid: Grid, times: Array, series: dict[str, Array], model: Model, system: str) -> xr.Dataset:
-    """Return the series over the cells of `grid` and time, with their attributes, in the order of `SERIES`."""
+    """Return the series over the cells of `grid` and time, with their attributes, those of measurements last."""
     series = {name: values.reshape(*grid.shape, -1) for name, values in series.items()}
     rows = {**SERIES, **{name: each for name, *each in model.series}}
-    specs = {name: Variable("float64", *row) for name, row in rows.items()}
+    specs = {name: Variable("float64", *row) for name, row in rows.items()} | dataset.SERIES
     time = xr.Variable("time", times, dataset.described(Variable("float64", u.TIME, "time t"), system))
     return xr.Dataset(dataset.variables(specs, (*grid.dims, "time"), series, system), {"time": time})
 
@@ -206,7 +204,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int
     # A fixed step meant for another method may be unstable with dopri5.
     other = {} if method and method.takes_every_step else {"method": PLAIN, "step": "auto"}
     config = replace(config, integrator=config.integrator.in_one_leg.model_copy(update=other))
-    dataset.check_names(config, SERIES)
+    dataset.check_names(config, {**SERIES, **dataset.SERIES})
     wanted = values_at(config, {} if at is None else at)
     config = config if samples else config.at_medians
     left = {name: column for name, column in config.cases.items() if name not in wanted}
@@ -365,19 +363,12 @@ def _go_on(kernel: Kernel, rows: Array, times: Array) -> None:
 def _series(kernel: Kernel, rows: Array, angles: Array) -> dict[str, Array]:
     """Return the series at the samples `rows`, each of shape (samples,); `angles` are those of `Model.turned`."""
     model = kernel.model
-    states, constants = kernel.unpack(rows)
-    spin, rattle, inertia = model.energy(states, constants)
-    series = {"spin": spin, **model.observe(states, constants)}
+    series = kernel.sampled(rows) | model.observe(*kernel.unpack(rows))
     for x, y in _VECTORS:
         if x in series and angles.any():
             along, across = series[x], series[y]
             series[x] = along * np.cos(angles) + across * np.sin(angles)
             series[y] = across * np.cos(angles) - along * np.sin(angles)
-    if kernel.ripple:
-        series["ripple_free_spin"] = kernel.steady_spin(rows)
-    if "energy_error" in kernel.measure:
-        series["energy"] = rattle + 0.5 * inertia * spin**2
-        series["dissipated"] = kernel.table(rows)["work"]
     return series
 
 

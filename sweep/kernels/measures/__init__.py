@@ -1,29 +1,35 @@
-"""List the measurements; each has its own file."""
+"""List the measurements; each has its own file in this folder, which is found there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+from pkgutil import iter_modules
 
 from sweep.kernels.measures.decay import Decay
-from sweep.kernels.measures.energy import EnergyError
-from sweep.kernels.measures.estimate import Estimate
-from sweep.kernels.measures.margin import Margin
 from sweep.kernels.measures.measurement import Kind, Measurement
 from sweep.kernels.measures.noise import RoundOff
-from sweep.kernels.measures.resting_spin import RestingSpin
-from sweep.kernels.measures.reversal_times import ReversalTimes
 from sweep.kernels.measures.reversals import Reversals
 from sweep.models.model import Model, Tier
 
-_KINDS: tuple[type[Kind], ...] = (
-    Reversals, EnergyError, Margin, RestingSpin, ReversalTimes, Estimate,
-)  # fmt: skip
-
-MEASURES: dict[str, type[Kind]] = {kind.name: kind for kind in _KINDS}
-"""The measurements that a configuration can ask for."""
-
 OF_COUNTS: tuple[type[Measurement], ...] = (RoundOff, Decay)
 """The measurements without which a count and its error cannot be judged."""
+
+
+def _found() -> Iterator[type[Kind]]:
+    """Yield the measurements in the files of this folder."""
+    for file in iter_modules(__path__, f"{__name__}."):
+        for each in vars(import_module(file.name)).values():
+            if isinstance(each, type) and issubclass(each, Kind) and "name" in vars(each):
+                yield each
+
+
+MEASURES: dict[str, type[Kind]] = {
+    kind.name: kind
+    for kind in sorted(_found(), key=lambda kind: (kind is not Reversals, kind.needs, kind.name))
+    if kind not in OF_COUNTS
+}
+"""The measurements that a configuration can ask for: the count, then each after those on which it builds."""
 
 
 def chosen(specs: Iterable[str]) -> tuple[Kind, ...]:
@@ -44,10 +50,10 @@ def complete(measurements: tuple[Kind, ...], tier: Tier) -> tuple[Kind, ...]:
 
 def possible(tier: Tier) -> tuple[str, ...]:
     """Names of the measurements that a model supports: one without a kernel has counts alone."""
-    simulated = isinstance(tier, Model)
-    return tuple(
-        name for name, kind in MEASURES.items() if kind.asks in tier.offers and (simulated or kind is Reversals)
-    )
+    offered = [name for name, kind in MEASURES.items() if kind.asks in tier.offers]
+    if not isinstance(tier, Model):
+        return tuple(name for name in offered if name == Reversals.name)
+    return tuple(name for name in offered if {*MEASURES[name].reads} <= {*tier.states})
 
 
 def default(tier: Tier) -> tuple[str, ...]:

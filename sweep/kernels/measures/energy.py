@@ -11,10 +11,11 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import BLOCK, Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch, measured
+from sweep.kernels.measures.measurement import Measurement, Sample, Stretch, measured
 from sweep.models.model import Array, Offer
 from sweep.models.slow.estimate import Ending
-from sweep.units import NUMBER
+from sweep.units import ENERGY_PER_MASS, NUMBER
+from sweep.variables import Variable
 
 
 class EnergyError(Measurement):
@@ -32,6 +33,10 @@ class EnergyError(Measurement):
             "rest.",
         )
     }  # fmt: skip
+    series = {
+        "energy": Variable("float64", ENERGY_PER_MASS, "energy above rest per mass"),
+        "dissipated": Variable("float64", ENERGY_PER_MASS, "work against friction per mass"),
+    }
 
     def make_step(self, layout: Layout, at_reversal):
         DISSIPATED = layout.at("work")
@@ -55,6 +60,9 @@ class EnergyError(Measurement):
 
     def skip(self, table: Table, stretch: Stretch) -> None:
         table["work"] += stretch.work
+
+    def sample(self, table: Table, seen: Sample) -> Mapping[str, Array]:
+        return {"energy": seen.total, "dissipated": table["work"]}
 
     def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
         start, violation = table["energy_start"], table["violation"]

@@ -1,8 +1,8 @@
 """Define what a measurement is, and explain how to add one.
 
-Subclass `Measurement` in a file of its own, or `Kind` for what is found after the run alone, and enter the class in
-`MEASURES` of `sweep.kernels.measures`.  The configuration, the kernels of all methods, the dataset and the plots then
-include it.  `energy_error` is a short example.
+Subclass `Measurement` in a file of its own in this folder, or `Kind` for what is found after the run alone.  The
+configuration, the kernels of all methods, the dataset, trajectories and the plots then include it.  `energy_error` is a
+short example.
 
 A measurement keeps its numbers in quantities of its own in each state row, named by `quantities`.  It fills and reads
 them in hooks, all of which are optional:
@@ -15,14 +15,16 @@ them in hooks, all of which are optional:
     make_check         for one lane at every check, after that decision
     skip               for many rows, when they have covered a stretch without steps
     mode_lost          for many rows, when the scale of a mode is given up
+    sample             for samples of trajectories, of which it shows a series
     read, doubts       once, when the trajectories have ended
 
 A hook `make_…` is itself called once, when the kernel is made.  It returns None, or a function marked
 `sweep.jit.inline`, which becomes part of the compiled loop and is called as listed.  That happens for every lane, even
 one that is idle or has ended, so the function must not change the quantities where its arguments say that the step
 does not count.  After a step it has to do so by conditional expressions rather than branches, so that the loop over
-lanes stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`.  In `skip`, `mode_lost`, `read`
-and `doubts` a quantity is `table["name"]`, of shape (cells,).
+lanes stays vectorised.  A quantity of the lane is `group[layout.at("name") + lane]`, and so is a state of the model,
+after the step (see `reads`).  In `skip`, `mode_lost`, `sample`, `read` and `doubts` a quantity is `table["name"]`, of
+shape (cells,).
 
 Whatever a run does not measure takes no space in its rows and adds no instruction to its kernel.
 
@@ -99,6 +101,16 @@ class Stretch:
     """Energies of the slower and the faster mode at its end, shape (cells, 2); None if the modes are not resolved."""
 
 
+class Sample(NamedTuple):
+    """Samples of trajectories, as passed to `Measurement.sample`; arrays of shape (samples,)."""
+
+    spin: Array
+    steady: Array
+    """Ripple-free spin; the spin itself unless a measurement needs it (`ripple`)."""
+    total: Array
+    """Energy above rest."""
+
+
 @dataclass(frozen=True)
 class Kind:
     """Something that a configuration can ask for: what is found about a trajectory after its run."""
@@ -116,6 +128,17 @@ class Kind:
     """Whether it is made by default, if the model supports it."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
+    series: ClassVar[Mapping[str, Variable]] = {}
+    """The series that it adds to a trajectory, by names other than those of variables; `Measurement.sample` returns
+    their values."""
+    reads: ClassVar[tuple[str, ...]] = ()
+    """Names of the states of the model that its hooks read.  Models and methods that lack them cannot have it."""
+    every_step: ClassVar[bool] = False
+    """Whether a hook has to follow each step from t = 0: it is then run only by methods that take every step, and
+    `skip` is never called."""
+    settles: ClassVar[bool] = True
+    """Whether its values are final once the spin can reverse no more.  If not, runs with it go on to `t_end`, unless
+    the configuration sets `stop_early`; its values are then those at `t_stop`."""
     bounds: ClassVar[tuple[int, int] | None] = None
     """Smallest and largest value of its setting, an integer, which is then the only field of the class, a dataclass;
     None if it has no setting."""
@@ -215,6 +238,10 @@ class Measurement(Kind):
 
         `rows` is a mask over the rows of `table`, shape (cells,).
         """
+
+    def sample(self, table: Table, seen: Sample) -> Mapping[str, Array]:
+        """Return the values of the `series`, each of shape (samples,); by default the quantities of the same names."""
+        return {name: table[name] for name in self.series}
 
     def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
         """As of `Kind`; by default the quantities of the same names."""

@@ -20,11 +20,12 @@ import numpy as np
 
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, Table
-from sweep.kernels.measures.measurement import Measurement, Stretch, measured
+from sweep.kernels.measures.measurement import Measurement, Sample, Stretch, measured
 from sweep.kernels.status import Doubt
 from sweep.models.model import Array, Columns, Model, Offer
 from sweep.models.slow.estimate import Ending
 from sweep.units import NUMBER, SPIN, TIME
+from sweep.variables import Variable
 
 
 class Reversals(Measurement):
@@ -45,6 +46,11 @@ class Reversals(Measurement):
             "float64", SPIN, "final spin n, without ripple",
             "Ripple-free spin averaged over the last full window before t_stop.",
         ),
+    }  # fmt: skip
+    series = {
+        "ripple_free_spin": Variable(
+            "float64", SPIN, "spin n without ripple", "Spin without the ripple of the rattle."
+        )
     }  # fmt: skip
 
     def start(self, model: Model, columns: Columns, rattle: Array) -> Mapping[str, Array | float]:
@@ -121,6 +127,9 @@ class Reversals(Measurement):
         table["earlier_half"] = np.where(closings > 0, last, table["earlier_half"])
         table["shifted"] = (table["shifted"] + closings) % 2
         table["phase"] = rest
+
+    def sample(self, table: Table, seen: Sample) -> Mapping[str, Array]:
+        return {"ripple_free_spin": seen.steady}
 
     def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
         closed = times >= table["period"]
