@@ -20,23 +20,23 @@ KERNELS = {method: make(method) for method in METHODS}
 each_method = pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 
 FLYING = np.arange(45) % 5 == 3
-MIXED: dict[str, dict[str, Any]] = {
-    "dopri5": {
-        "step": np.where(FLYING, 1e-4, np.linspace(0.01, 0.045, 45)),
-        "mu": np.where(FLYING, 20.0, np.linspace(20, 90, 45)),
-        "b": np.where(FLYING, 3.0, np.tile([1.5, 3.0, 5.0], 15)), "x0": np.where(FLYING, 1.0, 0.01),
-        "n0": np.where(FLYING, 3.0, np.tile([0.05, -0.03, 0.01, 0.03, 0.02], 9)),
-    },
-    "adams": {
-        "step": np.linspace(0.05, 0.12, 45), "mu": np.linspace(20, 900, 45), "b": np.tile([1.5, 3.0, 5.0], 15),
-        "n0": np.tile([0.05, -0.03, 0.002, 0.02, 3.0], 9),
-    },
-}  # fmt: skip
 
 
 def mixed(kernel: Kernel) -> np.ndarray:
     """Cells that settle, reach the limit, lift off and diverge, at different steps."""
-    return started(kernel, t_end=900.0, settle=True, **MIXED.get(kernel.method, MIXED["dopri5"]))
+    cells: dict[str, Any] = {
+        "step": np.linspace(0.05, 0.12, 45), "mu": np.linspace(20, 900, 45), "b": np.tile([1.5, 3.0, 5.0], 15),
+        "n0": np.tile([0.05, -0.03, 0.002, 0.02, 3.0], 9),
+    }  # fmt: skip
+    if kernel.stepper.limited:
+        decay = np.linspace(300, 66, 45)  # shares of the stability limit, from below to beyond it
+        cells = {
+            "step": np.where(FLYING, 1e-4, kernel.stepper.stable_step(decay)),
+            "mu": np.where(FLYING, 20.0, np.linspace(20, 90, 45)),
+            "b": np.where(FLYING, 3.0, cells["b"]), "x0": np.where(FLYING, 1.0, 0.01),
+            "n0": np.where(FLYING, 3.0, np.tile([0.05, -0.03, 0.01, 0.03, 0.02], 9)),
+        }  # fmt: skip
+    return started(kernel, t_end=900.0, settle=True, **cells)
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +47,8 @@ def expected() -> dict[str, np.ndarray]:
 @each_method
 def test_all_ends_are_among_the_mixed_cells(kernel: Kernel, expected: dict[str, np.ndarray]) -> None:
     ends = set(kernel.table(expected[kernel.method])["status"])
-    assert {SETTLED, TIME_LIMIT} <= ends
+    assert {SETTLED, TIME_LIMIT, DIVERGED} <= ends
     assert ends & {LIFT_OFF, PARADOX}
-    assert DIVERGED in ends or kernel.method == "adams"
 
 
 @each_method
