@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from math import prod
@@ -34,6 +34,8 @@ class Grid:
     """Columns of the table by parameter, each of shape (rows,)."""
     row: str = CASE
     """Name of the dimension along the rows of the table."""
+    assemble: Callable[[Mapping[str, Array]], dict[str, Array]] = dict
+    """Computes the parameters of the model from those that the configuration gives, by name, of shape (cells,)."""
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -49,7 +51,11 @@ class Grid:
         return prod(self.shape)
 
     def columns(self) -> dict[str, Array]:
-        """Return values of all parameters, axes and constants, each of shape (size,)."""
+        """Return the parameters of the model, each of shape (size,), besides those that the configuration gives."""
+        return self.assemble(self.given())
+
+    def given(self) -> dict[str, Array]:
+        """Return values of all parameters of the configuration, axes and constants, each of shape (size,)."""
         mesh = np.meshgrid(*map(np.arange, self.shape), indexing="ij")
         return self._at([place.ravel() for place in mesh]) | {
             name: np.full(self.size, value) for name, value in self.constants.items()
@@ -84,8 +90,9 @@ class Grid:
     def take(self, cells: Array) -> Grid:
         """Return the cells with these indices, as a list of cases."""
         if not self.shape:
-            return Grid({}, {}, {name: np.full(len(cells), value) for name, value in self.constants.items()})
-        return Grid({}, self.constants, self._at(np.unravel_index(cells, self.shape)))
+            table = {name: np.full(len(cells), value) for name, value in self.constants.items()}
+            return replace(self, constants={}, table=table)
+        return replace(self, axes={}, table=self._at(np.unravel_index(cells, self.shape)), row=CASE)
 
     def sample(self, cells: int) -> Grid:
         """Return about `cells` of the cells, evenly spaced along each dimension including its ends; at most all."""

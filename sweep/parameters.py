@@ -54,7 +54,7 @@ class Parameter:
     @property
     def meaning(self) -> str:
         """Meaning and unit, for messages and tables."""
-        alone = self.name in SI_ALONE
+        alone = self.name in (*SI_ALONE, *OF_SOLIDS)
         unit = named(self.units, SI if alone else PAPER_UNITS)
         return self.long_name + (f", in {unit}" if unit else "") + (" (units: SI only)" if alone else "")
 
@@ -75,6 +75,9 @@ class Parameter:
 
 SI_ALONE = ("mass", "gravity")
 """Parameters that are one in the paper's units."""
+
+OF_SOLIDS = ("length", "width", "height", "radius_long", "radius_short", "density", "angle")
+"""Parameters of solids (`sweep.models.general.solids`), from which others follow; all are in SI."""
 
 _Bounds = dict[str, Any]
 _SIZE: _Bounds = {"above": 0, "below": 1e6}
@@ -101,7 +104,17 @@ _SECTIONS: dict[str, tuple[_Row, ...]] = {
          "Angle from the ellipsoid's axes to the axes of inertia."),
         ("offset", u.LENGTH, "depth of the centre of mass", 0.0, _POINT,
          "Depth of the centre of mass below the ellipsoid's centre."),
+        ("length", u.LENGTH, "length of the solid", None, _SIZE),
+        ("width", u.LENGTH, "width of the solid", None, _SIZE),
+        ("height", u.LENGTH, "height of the solid", None, _SIZE),
+        ("radius_long", u.LENGTH, "radius of curvature along the body", None, _SIZE,
+         "Radius of curvature along the body at its lowest point."),
+        ("radius_short", u.LENGTH, "radius of curvature across the body", None, _SIZE,
+         "Radius of curvature across the body at its lowest point."),
+        ("angle", u.ANGLE, "angle of the solid's axes of inertia", 0.0, _ANGLE,
+         "Angle from the surface's axes to the axes of inertia."),
         ("mass", u.MASS, "mass", None, _MASS),
+        ("density", u.MASS_DENSITY, "density of the solid", None, _MASS),
         ("Ixx", u.INERTIA, "central moment of inertia about x", None, _MOMENT),
         ("Iyy", u.INERTIA, "central moment of inertia about y", None, _MOMENT),
         ("Izz", u.INERTIA, "central moment of inertia about z", None, _MOMENT),
@@ -152,9 +165,6 @@ PARAMETERS: dict[str, Parameter] = {
     for section, rows in _SECTIONS.items()
     for name, units, long_name, default, bounds, *description in rows
 }
-
-DENSITY = Parameter("density", "", u.MASS_DENSITY, "density of a body of one material", None, **_MASS)
-"""Not a key of a configuration: it can be measured instead of the mass."""
 
 PAPER_PARAMETERS: dict[str, Parameter] = {
     name: PARAMETERS[name] for name in ("a", "b", "c", "delta", "mu", "n0", "x0", "y0")

@@ -102,23 +102,26 @@ def factor(written: str, unit: Unit | None) -> float | None:
     return scale if same and isfinite(scale) else None
 
 
+def parts(text: str) -> tuple[str, str, str]:
+    """Return number, error and unit in a text such as "12,0±0,1cm", with decimal points; all are "" in other texts."""
+    found = _QUANTITY.fullmatch(text.strip())
+    value, error, unit = found.groups(default="") if found else ("", "", "")
+    return value.replace(",", "."), error.replace(",", "."), unit.strip()
+
+
 def quantity(text: str, unit: Unit | None, own: str = "") -> tuple[float, float] | None:
     """Return a number and its error in SI, such as (0.12, 0.001) for "12.0+-0.1 cm" or "12,0±0,1cm".
 
     The result is None if the text has another form. A number in the unit `own` is not converted.
     """
-    found = _QUANTITY.fullmatch(text.strip())
-    scale = None if not found else 1.0 if found[3] == own else factor(found[3], unit)
-    if not found or not scale:
-        return None
-    value, error = (number((part or "0").replace(",", ".")) or 0.0 for part in (found[1], found[2]))
-    return value * scale, error * scale
+    value, error, written = parts(text)
+    scale = None if not written else 1.0 if written == own else factor(written, unit)
+    return ((number(value) or 0.0) * scale, (number(error) or 0.0) * scale) if scale else None
 
 
 def unit_in(text: str) -> str:
     """Return the unit after the number in a text, such as "cm" in "12 cm"; empty if there is none."""
-    found = _QUANTITY.fullmatch(text.strip())
-    return found[3].strip() if found else ""
+    return parts(text)[2]
 
 
 def unit_of(units: Unit | str) -> Unit | None:

@@ -12,27 +12,27 @@ from sweep.cli import options
 from sweep.cli.faults import refuse, say
 from sweep.cli.options import PATH
 from sweep.faults import brief, suggestion
-from sweep.parameters import DENSITY, PARAMETERS, Parameter
+from sweep.parameters import PARAMETERS, Parameter
 
-MEASURED: dict[str, tuple[Parameter, str]] = {
-    "mass": (PARAMETERS["mass"], "Mass, such as 30g."),
-    "density": (DENSITY, "Density, such as 1.24g/cm3, instead of the mass."),
-    "length": (PARAMETERS["a"], "Length of the solid, such as 12.0+-0.1cm."),
-    "width": (PARAMETERS["b"], "Width of the solid."),
-    "height": (PARAMETERS["c"], "Height of the solid."),
-    "radius_long": (PARAMETERS["a"], "Radius of curvature along the body at its lowest point."),
-    "radius_short": (PARAMETERS["b"], "Radius of curvature across the body at its lowest point."),
-    "a": (PARAMETERS["a"], "Semi-axis of the surface along the body."),
-    "b": (PARAMETERS["b"], "Semi-axis of the surface across the body."),
-    "c": (PARAMETERS["c"], "Semi-axis of the surface, upright."),
-    "angle": (PARAMETERS["delta"], "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0]."),
+MEASURED = {
+    "mass": "Mass, such as 30g.",
+    "density": "Density, such as 1.24g/cm3, instead of the mass.",
+    "length": "Length of the solid, such as 12.0+-0.1cm.",
+    "width": "Width of the solid.",
+    "height": "Height of the solid.",
+    "radius_long": "Radius of curvature along the body at its lowest point.",
+    "radius_short": "Radius of curvature across the body at its lowest point.",
+    "a": "Semi-axis of the surface along the body.",
+    "b": "Semi-axis of the surface across the body.",
+    "c": "Semi-axis of the surface, upright.",
+    "angle": "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0].",
 }
-"""The quantities that can be measured: the parameter that gives unit and bounds, and the help text of the option."""
+"""The parameters that can be measured, with the help texts of their options."""
 
 
 def _measured(command: Callable[..., None]) -> Callable[..., None]:
     """Add an option for each quantity that can be measured."""
-    for name, (_, words) in reversed(MEASURED.items()):
+    for name, words in reversed(MEASURED.items()):
         command = click.option(f"--{name.replace('_', '-')}", metavar="NUMBER[+-ERROR]UNIT", help=words)(command)
     return command
 
@@ -42,22 +42,28 @@ def _measured(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--whole", is_flag=True, help="Use a whole ellipsoid instead of its lower half.")
 @click.option("--stl", type=PATH, help="STL file of the shape, in millimetres, z pointing up as it stands on a table.")
 def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
-    """Print a configuration computed from measured dimensions.
+    """Print a configuration of a body with measured sizes.
 
     The body is a homogeneous solid, by default the lower half of an ellipsoid. Lengths may be in m, cm, mm, in or ft.
     Give the mass, and for each direction a size, a radius of curvature or a semi-axis. If you give two, the size
     describes the solid and the other describes the surface. With --stl, give only the mass or the density.
+
+    A size without an error is uncertain by half of its last digit; write 36+-0mm if it is exact.
     """
     if stl and whole:
         refuse("--whole", "cannot be combined with --stl; leave out one of the two")
     from sweep.config import load_config
+    from sweep.config.cross_checks import unfit
     from sweep.config.document import parse_value
-    from sweep.config.measured import measured, of_shape, of_solid
+    from sweep.config.measured import guesses, of_shape, of_solid
 
-    given = {name: measured(name, text, MEASURED[name][0]) for name, text in texts.items() if text is not None}
-    text = of_shape(given, stl) if stl else of_solid(given, whole=whole)
-    load_config(parse_value(text, "body"))
-    click.echo(text, nl=False)
+    given = {name: text for name, text in texts.items() if text is not None}
+    text = of_shape(stl, given) if stl else of_solid(" ellipsoid" if whole else " half_ellipsoid", given)
+    scene = {"friction": {"mu": 0}, "start": {"n0": 0, "x0": 0, "y0": 0}, **parse_value(text, "body")}
+    at_medians = load_config(scene).at_medians
+    if reason := unfit(at_medians):
+        refuse("body", reason)
+    click.echo(text + guesses(at_medians.grid.columns()), nl=False)
 
 
 @click.command()

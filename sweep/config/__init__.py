@@ -11,6 +11,7 @@ from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from sweep import faults
@@ -25,6 +26,7 @@ from sweep.faults import Fault, InputError, fault_of, local_path, refusal, sugge
 from sweep.kernels import measures, methods
 from sweep.kernels.kernel import STRETCH
 from sweep.models.general.laws import LAWS
+from sweep.models.general.solids import Assembly
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.model import Model, Offer, Tier
 from sweep.models.origin import Origin
@@ -129,14 +131,13 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
     if samples and uncertain and values.cases is None:
         columns = drawn(uncertain, chances(len(uncertain), samples, values.seed))
     parameters = _parameters(model, given, columns, known, physics)
-    rattleback = not origin or loading.law(origin) is not None
     numbers = {name: value.numbers for name, value in parameters.items()} | columns
     measure = tuple(measures.default(model) if values.measure is None else values.measure)
     config = Config(
         name=values.name,
         model=values.model,
         parameters=parameters,
-        integrator=_integrator(values, model, measure, numbers if physics.units == SI and rattleback else {}),
+        integrator=_integrator(values, model, measure, _slowest(physics, numbers)),
         measure=measure,
         max_failed_fraction=values.max_failed_fraction,
         picture=_pictures(values, source),
@@ -147,6 +148,7 @@ def _resolve(values: Any, source: document.Document, origin: Origin | None) -> C
         units=physics.units,
         law=physics.law.name,
         surface=physics.surface.name,
+        assembly=physics.assembly,
         origin=origin,
     )
     object.__setattr__(config, "source", source)
@@ -196,7 +198,7 @@ def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physi
     if isinstance(made, Model):  # a user's model gives the units itself
         return Physics(made.units, LAWS[PAPER_LAW], ELLIPSOID, names)
     law = made.law if made else LAWS[values.friction.law]
-    return Physics(values.units, law, SURFACES[values.body.surface], names)
+    return Physics(values.units, law, SURFACES[values.body.surface], names, Assembly(values.body.solid))
 
 
 def _parameters(
@@ -227,13 +229,8 @@ def values_at(config: Config, at: Mapping[str, Any]) -> dict[str, Values]:
     return {name: values_of(config.table[name], value, config.unitless, "at") for name, value in at.items()}
 
 
-def _integrator(
-    values: Any, model: Tier, measure: tuple[str, ...], in_si: Mapping[str, tuple[float, ...]]
-) -> Integrator:
-    """Fill in the settings of the integrator whose defaults depend on other settings.
-
-    `in_si` holds the values of all parameters if they are in SI; the default time is then in seconds.
-    """
+def _integrator(values: Any, model: Tier, measure: tuple[str, ...], slowest: float) -> Integrator:
+    """Fill in the settings of the integrator whose defaults depend on other settings, such as the `slowest` body."""
     integrator, said, found = values.integrator, values.integrator.model_fields_set, dict[str, Any]()
     if "method" not in said:
         choice = isinstance(model, Model) and len(methods.automatic(model, measure)) > 1 and integrator.step == "auto"
@@ -242,16 +239,24 @@ def _integrator(
         found["stop_early"] = integrator.t_end >= schema.FOREVER
         said = {*said, "stop_early"}
     if "t_end" not in said:
-        found["t_end"] = usual = _longest(schema.T_END, in_si)
+        found["t_end"] = usual = _longest(schema.T_END, slowest)
         if Offer.ENDING in model.offers and ("stop_early" not in said or integrator.first_leg):
-            found |= {"t_end": _longest(schema.LATER, in_si), "stop_early": integrator.first_leg or usual}
+            found |= {"t_end": _longest(schema.LATER, slowest), "stop_early": integrator.first_leg or usual}
     return Integrator(**{**dict(integrator), **found})
 
 
-def _longest(time: float, in_si: Mapping[str, tuple[float, ...]]) -> float:
-    """A time given in sqrt(c/g): in SI that of the slowest body, in s."""
-    if not {"c", "gravity"} <= in_si.keys():
+def _slowest(physics: Physics, numbers: Mapping[str, tuple[float, ...]]) -> float:
+    """Return sqrt(c/g) of the slowest body with these values of its parameters, in s; 0 in other units than SI."""
+    if physics.units != SI or "gravity" not in numbers:
+        return 0.0
+    largest = physics.assembly.body({name: np.array([max(values)]) for name, values in numbers.items()})
+    return sqrt(float(largest["c"][0]) / min(numbers["gravity"])) if "c" in largest else 0.0
+
+
+def _longest(time: float, slowest: float) -> float:
+    """Return a time given in sqrt(c/g), whose value for the slowest body is `slowest`; in s, if that is not 0."""
+    if not slowest:
         return time
-    longest = time * sqrt(max(in_si["c"]) / min(in_si["gravity"]))
+    longest = time * slowest
     # A whole number of stretches, so that the steps do not depend on the limit (`sweep.kernels.kernel.STRETCH`).
     return float(STRETCH * max(ceil(min(longest, schema.LATEST) / STRETCH), 1))

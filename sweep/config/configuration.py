@@ -20,6 +20,7 @@ from sweep.grid import CASE, SAMPLE, Grid
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.common import EXTRAS
+from sweep.models.general.solids import NOTHING, Assembly
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.model import Model, Tier
 from sweep.models.origin import Origin
@@ -77,6 +78,8 @@ class Config:
     """Name of the law of friction, as in `sweep.models.general.laws.LAWS`."""
     surface: str = ELLIPSOID.name
     """Name of the surface, as in `sweep.models.general.surfaces.SURFACES`."""
+    assembly: Assembly = NOTHING
+    """What the body is made of."""
     origin: Origin | None = None
     """Origin of the model, if it is user-defined."""
     source: Document | None = field(default=None, init=False, compare=False, repr=False)
@@ -127,14 +130,15 @@ class Config:
         """The grid of all cells."""
         single = {name: v.numbers[0] for name, v in self.parameters.items() if not v.is_axis and name not in self.cases}
         axes, table = ({name: np.array(v) for name, v in each.items()} for each in (self.axes, self.cases))
-        return Grid(axes, single, table, self.row)
+        return Grid(axes, single, table, self.row, self.assembly.body)
 
     @property
     def tier(self) -> Tier:
         """The model that is run."""
         names = frozenset((*present(self.parameters), *self.cases))
         law = self.own_law or laws.LAWS[self.law]
-        return model_of(self.model, self.origin, Physics(self.units, law, SURFACES[self.surface], names))
+        physics = Physics(self.units, law, SURFACES[self.surface], names, self.assembly)
+        return model_of(self.model, self.origin, physics)
 
     @property
     def simulated(self) -> bool:
@@ -194,6 +198,8 @@ class Config:
             found["friction"] |= {"law": self.law}
         if self.surface != ELLIPSOID.name:
             found["body"] |= {"surface": self.surface}
+        if spec := self.assembly.spec:
+            found["body"] |= spec
         for name, value in self.parameters.items():
             if section := table[name].section:
                 found[section][name] = value.spec

@@ -19,12 +19,12 @@ from sweep.faults import Path, either
 from sweep.grid import BODY, Array, distinct
 from sweep.kernels import measures, methods
 from sweep.models.general import starts, validity
-from sweep.models.general.surfaces import SURFACES
+from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.model import Model
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.variants import BASES, INERTIA, Physics
-from sweep.parameters import PARAMETERS
+from sweep.parameters import OF_SOLIDS, PARAMETERS
 from sweep.units import SI, TIME, named
 
 MAX_CELLS = 1_000_000_000
@@ -42,8 +42,16 @@ def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator
     if not origin and physics.beyond and values.model not in BASES:
         unknown = ", ".join(physics.beyond)
         yield ("model",), f"the {values.model} model does not support {unknown}; choose {either(BASES)}"
-    else:
-        yield from ((PARAMETERS[name].place, reason) for name, reason in physics.misfits().items())
+        return
+    yield from ((PARAMETERS[name].place, reason) for name, reason in physics.misfits().items())
+    if solid := physics.assembly.solid:
+        for names in solid.needs:
+            if not {*names} & physics.names:
+                yield ("body",), f"a size of the solid is missing; add {either(names)}"
+        if physics.units != SI:
+            yield ("units",), "sizes of a solid are in SI; set units: SI"
+        if physics.surface != ELLIPSOID:
+            yield ("body", "surface"), "cannot be combined with a solid, whose surface is an ellipsoid; leave it out"
 
 
 def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:
@@ -174,7 +182,7 @@ def _unusable_step(config: Config) -> str:
     return "" if step <= longest else too_long
 
 
-_SHAPE = ("a", "b", "c", "offset", *INERTIA)
+_SHAPE = (*OF_SOLIDS, "a", "b", "c", "offset", *INERTIA)
 
 Reason = tuple[str, int, dict[str, float]]
 """Why some bodies are impossible or cannot stand, how many cells are affected, and the parameters of the first."""
@@ -187,7 +195,8 @@ def impossible(config: Config) -> str:
 
 def unfit(config: Config) -> str:
     """Describe the first body that is impossible or cannot stand; return "" if there is none."""
-    return next((f"{message} (at {_at(first, _SHAPE)})" for message, _, first in _reasons(config)), "")
+    names = [name for name in _SHAPE if name in config.tier.parameters]
+    return next((f"{message} (at {_at(first, names)})" for message, _, first in _reasons(config)), "")
 
 
 def described_impossible(config: Config) -> dict[str, str]:

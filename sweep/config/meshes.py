@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.models.general.solids import Numbers, mass_of
+from sweep.models.general.solids import Shape
 
 _LARGEST = 1e9
 _LOWEST = 0.1
 """The share of the height in which the surface is fitted."""
 _DIGITS = 6
 """Digits, as shares of the longest size, to which corners at the same place agree."""
+_NOTHING = 1e-6
+"""The share of the largest moment of inertia below which a product of inertia counts as zero."""
 _LINES, _OVERLAP = 400, 1e-3
 """Lines along which shells are counted, and the share of the volume in which they may overlap."""
 
@@ -44,21 +45,10 @@ def triangles(stl: bytes) -> NDArray[np.float64]:
     return found
 
 
-@dataclass(frozen=True)
-class Mesh:
-    """A solid that stands on the plane, in the axes of `a` and `b` and downwards."""
+def shape(corners: NDArray[np.float64]) -> tuple[Shape, float]:
+    """Return the solid inside triangles with these corners, and how far its surface is from the ellipsoid at most.
 
-    volume: float
-    inertia: NDArray[np.float64]
-    """Central moments of inertia per mass, shape (3, 3)."""
-    surface: dict[str, float]
-    """`a`, `b`, `c` and `offset`."""
-    misfit: float
-    """How far the surface is from that ellipsoid at most, where it was fitted."""
-
-
-def mesh(corners: NDArray[np.float64]) -> Mesh:
-    """Return the solid inside triangles with these corners, shape (triangles, 3, 3), z up; lengths in any unit.
+    The corners have the shape (triangles, 3, 3), z up, and any unit of length.
 
     An ellipsoid that touches the plane below the centre of mass has 2 h = k1 x² + 2 k12 x y + k2 y² + h²/c at the
     height h, with the curvatures k there: its coefficients come from linear least squares.
@@ -132,7 +122,7 @@ def _cross(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.f
     return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
 
 
-def _standing(volume: float, inertia: NDArray[np.float64], points: NDArray[np.float64]) -> Mesh:
+def _standing(volume: float, inertia: NDArray[np.float64], points: NDArray[np.float64]) -> tuple[Shape, float]:
     """Fit the surface to points around the centre of mass, and turn the axes."""
     bottom, height = points[:, 2].min(), np.ptp(points[:, 2])
     x, y, h = np.unique(points[points[:, 2] < bottom + _LOWEST * height], axis=0).T - [[0], [0], [bottom]]
@@ -149,12 +139,8 @@ def _standing(volume: float, inertia: NDArray[np.float64], points: NDArray[np.fl
     turn = np.array([[*along, 0], [along[1], -along[0], 0], [0, 0, -1]])
     surface = {"a": np.sqrt(c / curvatures[0]), "b": np.sqrt(c / curvatures[1]), "c": c, "offset": c - depth}
     misfit = np.abs(terms @ [k1, k12, k2, flat, *slope, shift] - 2 * h).max() / 2
-    return Mesh(volume, turn @ inertia @ turn.T, {name: float(each) for name, each in surface.items()}, float(misfit))
-
-
-def body(solid: Mesh, measured: Numbers) -> dict[str, Any]:
-    """Return the parameters of the section `body` for a solid whose `mass` or `density` is known, all in SI units."""
-    mass = mass_of(measured, solid.volume)
-    places = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
-    kept = {name: at for name, at in places.items() if abs(solid.inertia[at]) > 1e-6 * solid.inertia[2, 2]}
-    return solid.surface | {"mass": mass} | {name: mass * solid.inertia[at] for name, at in kept.items()}
+    J = turn @ inertia @ turn.T
+    J[np.abs(J) < _NOTHING * J[2, 2]] = 0
+    moments = {f"J{'xyz'[i]}{'xyz'[j]}": J[i, j] for i in range(3) for j in range(i, 3)}
+    numbers = {name: float(each) for name, each in (surface | moments).items()}
+    return Shape(volume=float(volume), **numbers), float(misfit)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
 from pydantic.fields import FieldInfo
 
+from sweep.config.document import is_number
 from sweep.config.messages import Allowed, wrong
 from sweep.config.values import MAX_AXIS, Strict, Whole, in_si, parse_values, whole
 from sweep.faults import either, refusal
@@ -17,6 +19,7 @@ from sweep.kernels.method import TOLERANCE
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
 from sweep.models.general.laws import LAWS
+from sweep.models.general.solids import SOLIDS, Shape
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.models.origin import Origin
 from sweep.models.user import loading
@@ -156,6 +159,25 @@ def _physical(section: str, table: Mapping[str, Parameter]) -> dict[str, Any]:
     }
 
 
+_SOLID = f"{either(SOLIDS)}, or the numbers that `sweep body --stl` prints"
+
+
+def _solid(raw: Any) -> Any:
+    """Return a solid whose sizes are parameters, by its name or by the numbers of a `Shape`."""
+    if not isinstance(raw, dict):
+        if raw not in SOLIDS:
+            raise wrong(refusal(raw, _SOLID, SOLIDS))
+        return SOLIDS[raw]
+    for name, kind in Shape.__dataclass_fields__.items():
+        positive = name in ("volume", "a", "b", "c", *(f"J{axis}{axis}" for axis in "xyz"))
+        value = raw.get(name, 0.0 if kind.default == 0.0 else None)
+        if not is_number(value) or not isfinite(value) or (positive and value <= 0):
+            raise wrong(refusal(value, f"a finite number{' > 0' if positive else ''}, in SI"), name)
+    if unknown := raw.keys() - Shape.__dataclass_fields__:
+        raise wrong(f"unknown key; the keys here are {', '.join(Shape.__dataclass_fields__)}", min(unknown))
+    return Shape(**raw)
+
+
 class Friction(Strict):
     law: Literal[tuple(LAWS)] = Field(default=PAPER_LAW, description="law of slip friction")  # type: ignore[valid-type]
 
@@ -163,6 +185,9 @@ class Friction(Strict):
 class Body(Strict):
     surface: Literal[tuple(SURFACES)] = Field(  # type: ignore[valid-type]
         default=ELLIPSOID.name, description="surface of the body, which defines the meaning of `a`, `b` and `c`"
+    )
+    solid: Annotated[Any, BeforeValidator(_solid), Allowed(_SOLID)] = Field(
+        default=None, description="homogeneous solid whose sizes determine surface and inertia of the body"
     )
 
 

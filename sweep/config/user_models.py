@@ -63,4 +63,4 @@ def try_out(config: Config) -> None:
     if config.origin:
         ends = {name: np.array([v.numbers[0], v.numbers[-1]]) for name, v in config.parameters.items()}
         ends |= {name: np.array([column[0], column[-1]]) for name, column in config.cases.items()}
-        trial.try_out(config.equations, ends, config.own_law)
+        trial.try_out(config.equations, config.assembly.body(ends), config.own_law)

@@ -14,7 +14,7 @@ from sweep.config import Config
 from sweep.config.document import parse_value
 from sweep.engine.plan import choose
 from sweep.engine.whole import Whole
-from sweep.grid import Array, Grid
+from sweep.grid import CASE, Array, Grid
 from sweep.kernels.kernel import steps_to
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.status import TIME_LIMIT
@@ -158,12 +158,12 @@ def _grid(there: xr.Dataset) -> Grid:
     axes = {str(dim): values[str(dim)] for dim in there["status"].dims if dim not in ROWS}
     rows = [str(dim) for dim in there["status"].dims if dim in ROWS]
     table = {name: each for name, each in values.items() if rows and [*there[name].dims] == rows and name not in rows}
-    return Grid(axes, constants, table, *rows)
+    return Grid(axes, constants, table, rows[0] if rows else CASE)
 
 
 def _match(grid: Grid, there: Grid) -> Array:
     """Return for each cell of `grid` its index in the grid `there`, or -1, shape (cells,)."""
-    columns, old = grid.columns(), there.columns()
+    columns, old = grid.given(), there.given()
     if set(columns) != set(old):
         return np.full(grid.size, -1)
     known, rows = (np.stack([some[name] + 0.0 for name in sorted(columns)], axis=1) for some in (old, columns))

@@ -92,8 +92,9 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     taken = np.meshgrid(*(values[:: every[name]] for name, values in axes.items()), indexing="ij")
     shape = taken[0].shape
     fixed = {**setup.base, **source.parameters_at(tuple(setup.base), state.at), **state.changed}
-    columns = {name: np.full(taken[0].size, value) for name, value in fixed.items()}
-    columns |= {name: values.ravel() for name, values in zip(axes, taken, strict=True)}
+    given = {name: np.full(taken[0].size, value) for name, value in fixed.items()}
+    given |= {name: values.ravel() for name, values in zip(axes, taken, strict=True)}
+    columns = setup.config.assembly.body(given)
     place = np.arange(taken[0].size).reshape(shape)
     possible = ~setup.config.tier.impossible(columns)
     status = np.where(possible, SETTLED, IMPOSSIBLE)
@@ -122,7 +123,7 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[possible[some] & ~simulated[some]]
         for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
-            theirs = take(columns, cells)
+            theirs = take(given, cells)
             with all_threads():
                 result = run(_of_cells(setup.config, theirs, tuple(axes)), reporter=job)
             found[cells], status[cells], simulated[cells] = result["reversals"], result["status"], True

@@ -12,16 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
+from sweep.faults import either
 from sweep.models.general import rigid_body, starts
 from sweep.models.general.common import EXTRAS, SOLID, Variant
 from sweep.models.general.couples import COUPLES
 from sweep.models.general.laws import LAWS, Law
+from sweep.models.general.solids import NOTHING, SOLIDS, Assembly
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, Surface
 from sweep.models.ladder.noslip import rolling
 from sweep.models.ladder.slip import slipping
 from sweep.models.model import Model
 from sweep.models.origin import Origin
-from sweep.parameters import PAPER_PARAMETERS, PARAMETERS, SI_ALONE, Parameter
+from sweep.parameters import OF_SOLIDS, PAPER_PARAMETERS, PARAMETERS, SI_ALONE, Parameter
 from sweep.units import PAPER_UNITS, SI
 
 BASES = ("slip", "noslip")
@@ -91,6 +93,7 @@ class Physics:
     surface: Surface
     names: frozenset[str]
     """The parameters that the configuration names."""
+    assembly: Assembly = NOTHING
 
     @property
     def beyond(self) -> list[str]:
@@ -114,10 +117,13 @@ class Physics:
         by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))
         start = by_angles if self.names & {*starts.ANGLES, *starts.SLIP} else starts.POINT
         couples = tuple(couple for couple in COUPLES.values() if self.names & {*couple.parameters})
-        parameters = ("a", "b", "c", "offset", *moments, *system, *start)
-        named = {*self.names, *system}
+        solid, body = self.assembly.solid, ("a", "b", "c", "offset", *moments, *system)
+        if solid:
+            body = (*solid.parameters(self.names), "gravity")
+        named = {*self.names, *system, *self.assembly.named}
         extras = {n: each for n, each in EXTRAS.items() if named & {*each.parameters} and each.on(self.surface)}
-        parameters += tuple(name for each in extras.values() for name in each.parameters if name not in parameters)
+        more = (name for each in extras.values() for name in each.parameters if not solid and name not in body)
+        parameters = (*body, *start, *more)
         return make(Variant(self.law if base == "slip" else None, couples, self.surface, frozenset(extras)), parameters)
 
     def misfits(self) -> dict[str, str]:
@@ -128,6 +134,15 @@ class Physics:
             found["delta"] = f"cannot be combined with {_some(inertia)}; leave out either"
         elif not self.surface.homogeneous:
             found["delta"] = f"has no meaning with surface: {self.surface.name}; give the elements of inertia instead"
+        if solid := self.assembly.solid:
+            sizes = solid.parameters(frozenset(PARAMETERS))
+            words = f"does not belong to this solid; leave it out (it takes {', '.join(sizes)})"
+            others = (p.name for p in PARAMETERS.values() if p.section == "body" and p.name not in sizes)
+            found |= dict.fromkeys(others, words)
+            both = (pair for pair in solid.excluding if self.names.issuperset(pair))
+            found |= {one: f"cannot be combined with {other}; leave out one of the two" for one, other in both}
+        else:
+            found |= dict.fromkeys(OF_SOLIDS, f"is the size of a solid; add solid: {either(SOLIDS)}")
         if angles:
             ways = f"either {', '.join(starts.POINT)} or angles, omega1 … omega3 and slip"
             found |= dict.fromkeys(starts.POINT, f"cannot be combined with {_some(angles)}; give {ways}")

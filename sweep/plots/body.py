@@ -18,6 +18,7 @@ from sweep.grid import Array
 from sweep.models.general.rigid_body import contact_on
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES, offset
 from sweep.models.vectors import Vector
+from sweep.results import kind
 
 SUN = {"azdeg": 225, "altdeg": 60}
 """Direction of the light, in degrees."""
@@ -72,19 +73,19 @@ class Moving:
 
 def drawable(dataset: xr.Dataset) -> bool:
     """Return whether trajectories have an attitude and a known shape; user-defined models may lack both."""
-    return all(name in dataset for name in ("heading", "a", "b", "c"))
+    return "heading" in dataset and ("body" in dataset.attrs or all(name in dataset for name in ("a", "b", "c")))
 
 
 def moving(one: xr.Dataset, times: Array) -> Moving:
     """Return the body of a trajectory at the given times."""
-    columns = {name: np.atleast_1d(one[name].values) for name in ("a", "b", "c", "offset") if name in one}
+    columns = kind.body(one)
     surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
     constants = SimpleNamespace(
         **{k: v[0] for k, v in zip(surface.constants, surface.of(columns, np.zeros(1)), strict=True)}
     )
     heading, roll, pitch, *path = at(one, times, "heading", "roll_angle", "pitch_angle", "table_x", "table_y")
-    delta = float(one["delta"]) if "delta" in one else 0.0
-    turns = rotation(heading, roll, pitch) @ Rotation.from_euler("z", -delta).as_matrix()
+    delta = columns.get("delta", np.zeros(1))
+    turns = rotation(heading, roll, pitch) @ Rotation.from_euler("z", -delta[0]).as_matrix()
     contacts = np.array(contact_on(surface)(turns[:, 2, 0], turns[:, 2, 1], Vector(0.0, 0.0, 0.0), constants)[2]).T
     return Moving(_points(surface is ELLIPSOID, columns), turns, contacts, np.array(path))
 

@@ -18,6 +18,7 @@ from sweep.models.general import rigid_body
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
 from sweep.plots import labels, theory
 from sweep.plots.figure import Sheet, is_column, panel_width, zero_line
+from sweep.results import kind
 from sweep.results.dataset import SERIES, TRAJECTORIES, along_one
 from sweep.results.kind import is_of_own_body, parameters
 
@@ -196,9 +197,8 @@ def reversal_times(one: xr.Dataset) -> Array:
         return np.array([])
     time, spin = one["time"].values, one["ripple_free_spin"].values
     if not is_of_own_body(one):
-        columns = {name: np.atleast_1d(one[name].values) for name in rigid_body.PARAMETERS if name in one}
         surface = SURFACES[one.attrs.get("surface", ELLIPSOID.name)]
-        tau = float(rigid_body.slower_period(columns, surface)[0])
+        tau = float(rigid_body.slower_period(kind.body(one), surface)[0])
         total = np.concatenate([[0], np.cumsum(np.diff(time) * (spin[1:] + spin[:-1]) / 2)])
         ends = np.arange(0, time[-1], tau)
         time, spin = ends[:-1] + tau / 2, np.diff(np.interp(ends, time, total)) / tau

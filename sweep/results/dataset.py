@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from typing import Any
@@ -177,6 +178,7 @@ def label(config: Config, grid: Grid, arrays: Mapping[str, Array], attributes: M
     of = " of a rattleback" if config.of_rattlebacks else ""
     head = {"Conventions": "CF-1.11", "title": f"{config.name}: reversals{of} ({config.model} model)"}
     head |= {"surface": config.surface} if config.surface != ELLIPSOID.name else {}
+    head |= {"body": json.dumps(config.assembly.spec)} if config.assembly.spec else {}
     found = xr.Dataset(variables, coordinates, {**head, **attributes})
     return with_probabilities(config, found) if grid.row == SAMPLE and "reversals" in found else found
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from sweep.faults import FileError, counted
+from sweep.grid import Array
+from sweep.models.general.solids import Assembly
 from sweep.parameters import PARAMETERS
 from sweep.results.margins import POINTS
 from sweep.results.netcdf import open_dataset
@@ -136,7 +140,7 @@ def _needs(dataset: xr.Dataset, found: Kind) -> Mapping[str, tuple[str, ...]]:
     if found == TRAJECTORY:
         cells = dataset["status"].dims if "status" in dataset else ()
         needs |= _over(cells, "t_stop") | _over((*cells, "time"), "spin")  # type: ignore[arg-type]
-        needs |= _over((), "a", "b", "c") if not is_of_own_body(dataset) else {}
+        needs |= _over((), "a", "b", "c") if not is_of_own_body(dataset) and "body" not in dataset.attrs else {}
     return needs | _over((), *PROBABILITIES, "count") if found == RUN and "probability" in dataset else needs
 
 
@@ -148,3 +152,9 @@ def is_of_own_body(dataset: xr.Dataset) -> bool:
 def parameters(dataset: xr.Dataset) -> list[str]:
     """Return the names of the physical parameters that a dataset contains."""
     return [name for name in str(dataset.attrs.get("model_parameters", "")).split() or PARAMETERS if name in dataset]
+
+
+def body(one: xr.Dataset) -> dict[str, Array]:
+    """Return the parameters of a single trajectory, with those that follow from sizes, each of shape (1,)."""
+    given = {name: np.atleast_1d(one[name].values) for name in parameters(one)}
+    return Assembly.of(json.loads(one.attrs.get("body", "{}"))).body(given)

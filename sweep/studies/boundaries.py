@@ -104,7 +104,7 @@ class Boundaries(Search):
 
     def ask(self) -> Mapping[str, Array]:
         if not self.rounds:
-            columns = self.grid.columns()
+            columns = self.grid.given()
             return {name: columns[name] for name in self.config.axes}
         self._asked = next(self._asking, [])
         rows = [each.parameters(place) for _, each, place in self._asked]
@@ -242,8 +242,8 @@ class Along(Boundaries):
         parts = -(-(_PLACES - 1) // (len(values) - 1))
         at = np.arange(parts * (len(values) - 1) + 1)
         places = self.along.bent(np.interp(at / parts, np.arange(len(values)), self.along.straight(values)))
-        columns = {name: np.full(len(places), column[0]) for name, column in self.grid.columns().items()}
-        columns |= {self.along.name: places}
+        given = {name: np.full(len(places), column[0]) for name, column in self.grid.given().items()}
+        columns = self.config.assembly.body(given | {self.along.name: places})
         possible = ~self.config.equations.impossible(columns)
         at, places, columns = at[possible], places[possible], take(columns, possible)
         counts = estimates(self.config.equations, columns, check=False)["reversals_estimated"]

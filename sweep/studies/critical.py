@@ -197,7 +197,8 @@ class CriticalSpins(Search):
         body = np.array([spin.body for spin, places in self._asked for _ in places], int)
         n0 = np.array([spin.sign * np.exp(place) for spin, places in self._asked for place in places])
         varying = (*self.config.axes, *self.config.cases)
-        return {name: self.columns[name][body] for name in varying} | {"n0": n0}
+        given = self.grid.given()
+        return {name: given[name][body] for name in varying} | {"n0": n0}
 
     def learn(self, found: Mapping[str, Array]) -> None:
         counts, reversed_ = Counts.of(found), found["reversals"] > 0

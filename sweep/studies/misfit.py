@@ -108,7 +108,8 @@ class Problem:
     def columns(self, places: Array) -> dict[str, Array]:
         """Return all parameters of the bodies at places of shape (cells, free)."""
         fixed = {name: np.full(len(places), v.numbers[0]) for name, v in self.config.parameters.items()}
-        return fixed | {name: values for name, values in self._found(places).items() if name not in UNKNOWNS}
+        free = {name: values for name, values in self._found(places).items() if name not in UNKNOWNS}
+        return self.config.assembly.body(fixed | free)
 
     def _found(self, places: Array) -> dict[str, Array]:
         """Return the free parameters at places of shape (cells, free), by name."""

@@ -151,16 +151,21 @@ def _drag(config: Config, film: Film) -> float:
     spin = np.gradient(film.value, film.time) if film.what == "heading" else film.value
     size = np.abs(spin[last])
     rate = max(-stats.theilslopes(size, film.time[last])[0], 0.0) / max(np.median(size), 1e-12)
-    columns = {name: values.numbers[0] for name, values in config.parameters.items()}
-    mass = columns.get("mass", 1.0)
-    inertia = columns.get("Izz", mass * (columns["a"] ** 2 + columns["b"] ** 2) / 5)
+    columns = _body(config)
+    inertia = columns.get("Izz", columns.get("mass", 1.0) * (columns["a"] ** 2 + columns["b"] ** 2) / 5)
     return float(inertia * min(max(5 * rate, 2 / film.time[-1]), 20 / film.time[-1]))
+
+
+def _body(config: Config) -> dict[str, float]:
+    """Return the parameters of the model where each of the configuration's has its smallest value."""
+    least = {name: np.array([min(values.numbers)]) for name, values in config.parameters.items()}
+    return {name: float(values[0]) for name, values in config.assembly.body(least).items()}
 
 
 def _starts(config: Config, name: str, value: float) -> Range:
     """Return the range of the start point or tilt, of either sign, nearly logarithmic."""
     size = _STARTS[name]
-    length = min(config.parameters[size].numbers) if size else 1.0
+    length = _body(config)[size] if size else 1.0
     most = _ON_BODY * length if size and config.surface == "ellipsoid" else inf
     far = min(max(_FARTHEST * length if size else _TILTED, 2 * abs(value)), most)
     return Range(-far, far, far * _EITHER_SIGN, least=-most, most=most)
@@ -182,8 +187,9 @@ def mirrored(config: Config, free: Mapping[str, Range]) -> list[str]:
 
 def wide(config: Config, law: Law) -> Mapping[str, tuple[float, float]]:
     """Return the ranges of the parameters of a law of friction, whatever the configuration says of them."""
-    length = config.parameters["c"].numbers[0] if config.units == SI else 1.0
-    velocity = sqrt(length * config.parameters["gravity"].numbers[0]) if config.units == SI else 1.0
+    body = _body(config)
+    length = body["c"] if config.units == SI else 1.0
+    velocity = sqrt(length * body["gravity"]) if config.units == SI else 1.0
     return {
         "mu": (0.02, 1.0) if "mu" in law.pure else (1 / velocity, 300 / velocity),
         "mu_static": (0.02, 1.0),

@@ -1,68 +1,149 @@
-"""The inertia of homogeneous solids: an ellipsoid, and the lower half of one, flat on top.
+"""The parameters of a body that is given by its measured sizes.
 
-About the ellipsoid's centre and with the semi-axes A, B and C, both have the matrix of inertia
+The solids are a homogeneous ellipsoid, the lower half of one, flat on top, and any other whose mass properties are
+known.  About the ellipsoid's centre and with the semi-axes A, B and C, both ellipsoids have the matrix of inertia
 m diag(B² + C², A² + C², A² + B²)/5, because the halves are mirror images.  The centre of mass of the half lies 3C/8
 below it (E. W. Weisstein, "Ellipsoid" and "Hemisphere", mathworld.wolfram.com).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-Numbers = Mapping[str, Any]
-"""Real numbers by name; complex ones where derivatives are taken."""
+from sweep.models.model import Array, Columns
 
-RADII = {"a": "radius_long", "b": "radius_short"}
-"""The radius of curvature at the lowest point from which a semi-axis of the surface follows."""
+_MASS = ("mass", "density")
 
-SIZES = {"a": "length", "b": "width", "c": "height"}
+_SIZES = {"a": "length", "b": "width", "c": "height"}
 """The size of the solid from which a semi-axis follows."""
 
-
-def body(measured: Numbers, *, whole: bool) -> dict[str, Any]:
-    """Return the parameters of the section `body`, from what is measured; both in SI units.
-
-    The solid has the sizes `length`, `width` and `height`, and its surface the semi-axes `a`, `b` and `c`, or the radii
-    of curvature `radius_long` and `radius_short`.  Missing dimensions of the solid default to those of the surface, and
-    vice versa.  The inertia is turned by `angle` against the surface, as by the parameter `delta`.
-
-    Parameters
-    ----------
-    measured : `mass` or `density`, `angle`, and one number or more for each semi-axis
-    whole : whether the solid is the whole ellipsoid, not its lower half
-    """
-    parts = {"length": 2, "width": 2, "height": 2 if whole else 1}
-    solid = {axis: measured[name] / parts[name] for axis, name in SIZES.items() if name in measured}
-    surface = solid | {axis: measured[axis] for axis in SIZES if axis in measured}
-    surface |= {axis: np.sqrt(measured[name] * surface["c"]) for axis, name in RADII.items() if name in measured}
-    a, b, c = ((surface | solid)[axis] for axis in SIZES)
-    below = 0 if whole else 3 * c / 8
-    mass = mass_of(measured, (4 if whole else 2) / 3 * np.pi * a * b * c)
-    cos, sin = np.cos(measured["angle"]), np.sin(measured["angle"])
-    along, across = mass * ((b**2 + c**2) / 5 - below**2), mass * ((a**2 + c**2) / 5 - below**2)
-    return {
-        "a": surface["a"], "b": surface["b"], "c": surface["c"], "offset": surface["c"] - (c - below), "mass": mass,
-        "Ixx": along * cos**2 + across * sin**2, "Iyy": along * sin**2 + across * cos**2,
-        "Izz": mass * (a**2 + b**2) / 5, "Ixy": (along - across) * sin * cos,
-    }  # fmt: skip
+_RADII = {"a": "radius_long", "b": "radius_short"}
+"""The radius of curvature at the lowest point from which a semi-axis of the surface follows."""
 
 
-def mass_of(measured: Numbers, volume):
-    """Return the measured mass, or the one that follows from the density."""
-    return measured["mass"] if "mass" in measured else measured["density"] * volume
+class Solid:
+    """A homogeneous solid, which its parameters and those of its surface determine."""
+
+    needs: tuple[tuple[str, ...], ...] = (_MASS,)
+    """Of each of these tuples of parameters at least one is needed."""
+    excluding: tuple[tuple[str, str], ...] = (_MASS,)
+    """Pairs of parameters of which only one may be given."""
+    optional: tuple[str, ...] = ()
+    """Parameters that have a default."""
+
+    def parameters(self, names: frozenset[str]) -> tuple[str, ...]:
+        """Return the parameters on which the body depends, if a configuration gives those called `names`."""
+        return (*(name for each in self.needs for name in each if name in names), *self.optional)
 
 
-def propagated(formula: Callable[[Numbers], Numbers], values: Numbers, errors: Numbers) -> dict[str, float]:
-    """Propagate independent `errors` of `values` through `formula`, to first order.
+@dataclass(frozen=True)
+class Ellipsoid(Solid):
+    """A homogeneous ellipsoid, or the lower half of one."""
 
-    Derivatives are by a complex step, which does not round (W. Squire and G. Trapp, SIAM Rev. 40, 110-112, 1998).
-    """
-    tiny = 1e-30
-    steps = {name: formula({**values, name: values[name] + 1j * tiny}) for name in errors}
-    return {
-        entry: float(np.sqrt(sum((np.imag(steps[name][entry]) / tiny * errors[name]) ** 2 for name in errors)))
-        for entry in formula(values)
-    }
+    spec: str
+    """Its name in a configuration."""
+    whole: bool
+
+    needs = (_MASS, ("length", "radius_long", "a"), ("width", "radius_short", "b"), ("height", "c"))
+    excluding = (_MASS, ("a", "radius_long"), ("b", "radius_short"))
+    optional = ("angle",)
+    skew = False
+    """Whether the third axis may differ from an axis of inertia."""
+
+    def body(self, given: Columns) -> dict[str, Array]:
+        """Return the parameters of the models' body, in SI and each of shape (cells,).
+
+        The solid has the sizes `length`, `width` and `height`, and its surface the semi-axes `a`, `b` and `c`, or the
+        radii of curvature `radius_long` and `radius_short`.  Missing dimensions of the solid default to those of the
+        surface, and vice versa.  The inertia is turned by `angle` against the surface, as by the parameter `delta`.
+        """
+        parts = {"length": 2, "width": 2, "height": 2 if self.whole else 1}
+        solid = {axis: given[size] / parts[size] for axis, size in _SIZES.items() if size in given}
+        surface = solid | {axis: given[axis] for axis in _SIZES if axis in given}
+        surface |= {axis: np.sqrt(given[name] * surface["c"]) for axis, name in _RADII.items() if name in given}
+        a, b, c = ((surface | solid)[axis] for axis in _SIZES)
+        below = 0 if self.whole else 3 * c / 8
+        mass = _mass(given, (4 if self.whole else 2) / 3 * np.pi * a * b * c)
+        cos, sin = np.cos(given["angle"]), np.sin(given["angle"])
+        along, across = mass * ((b**2 + c**2) / 5 - below**2), mass * ((a**2 + c**2) / 5 - below**2)
+        return {
+            **surface, "offset": surface["c"] - (c - below), "mass": mass,
+            "Ixx": along * cos**2 + across * sin**2, "Iyy": along * sin**2 + across * cos**2,
+            "Izz": mass * (a**2 + b**2) / 5, "Ixy": (along - across) * sin * cos,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape(Solid):
+    """A homogeneous solid of any shape: its volume, its surface and its inertia per mass, in SI."""
+
+    volume: float
+    a: float
+    b: float
+    c: float
+    offset: float
+    Jxx: float
+    Jyy: float
+    Jzz: float
+    Jxy: float = 0.0
+    Jxz: float = 0.0
+    Jyz: float = 0.0
+
+    @property
+    def spec(self) -> dict[str, float]:
+        """Return the value of `solid` in a configuration."""
+        return {name: value for name, value in asdict(self).items() if value or name == "offset"}
+
+    @property
+    def skew(self) -> bool:
+        return bool(self.Jxz or self.Jyz)
+
+    def body(self, given: Columns) -> dict[str, Array]:
+        """Return the parameters of the models' body, as `Ellipsoid.body` does."""
+        mass = _mass(given, self.volume)
+        one = np.ones_like(mass)
+        surface = {name: one * getattr(self, name) for name in ("a", "b", "c", "offset")}
+        moments = {f"I{name[1:]}": mass * value for name, value in asdict(self).items() if name[0] == "J"}
+        return {**surface, "mass": mass, **moments}
+
+
+def _mass(given: Columns, volume: Array | float) -> Array:
+    return given["mass"] if "mass" in given else given["density"] * volume
+
+
+SOLIDS = {each.spec: each for each in (Ellipsoid("half_ellipsoid", whole=False), Ellipsoid("ellipsoid", whole=True))}
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """What the body of a configuration is made of: from its parameters those of the models' body follow."""
+
+    solid: Ellipsoid | Shape | None = None
+
+    @classmethod
+    def of(cls, spec: Mapping[str, Any]) -> Assembly:
+        """Return the assembly that has this `spec`."""
+        solid = spec.get("solid")
+        return cls(Shape(**solid) if isinstance(solid, Mapping) else solid and SOLIDS[solid])
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """Return the keys of the section `body` that describe it; none for a body given by its parameters alone."""
+        return {"solid": self.solid.spec} if self.solid else {}
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The parameters that follow and that, where the configuration gives them, choose a variant of the model."""
+        return ("offset", *(("Ixz", "Iyz") if self.solid.skew else ())) if self.solid else ()
+
+    def body(self, given: Columns) -> dict[str, Array]:
+        """Return the `given` parameters and those that follow, which replace given ones, each of shape (cells,)."""
+        return {**given, **(self.solid.body(given) if self.solid else {})}
+
+
+NOTHING = Assembly()
+"""The assembly of a body that is given by the parameters of the models."""
