@@ -20,6 +20,7 @@ import xarray as xr
 from hypothesis import settings
 from support import SMALL, Write
 from support.kernels import SHARED, kernel
+from support.runs import limited, nothing_drawn
 
 import sweep
 from sweep.jit import showing
@@ -137,15 +138,16 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 @pytest.fixture
-def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+def short_chunks() -> Iterator[None]:
     """Chunks of twenty blocks on any machine; twelve cells take some twenty of them."""
-    monkeypatch.setattr("sweep.engine.executor._rescale", lambda *_: 20)
+    with limited(chunk_blocks=20):
+        yield
 
 
 @pytest.fixture
-def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """They take longer to draw than small runs."""
-    monkeypatch.setattr("sweep.engine.run._draw", lambda *_: None)
+def no_pictures() -> Iterator[None]:
+    with nothing_drawn():
+        yield
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from sweep.config import Config
+from sweep.engine import limits
 from sweep.engine.executor import nominal_seconds
-from sweep.engine.local import BATCH
 from sweep.engine.plan import Choice, choose, kernels
 from sweep.faults import duration
 from sweep.grid import Array
@@ -47,7 +47,7 @@ def estimate(config: Config) -> str:
     total = sum(each.sum() for each in steps) * share
     numbers = sum(len(each.cells) * len(each.kernel.layout.names) for each in chosen)
     bytes_a_cell = np.dtype(float).itemsize * numbers / sample.size
-    memory, disk = min(grid.size, BATCH) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
+    memory, disk = min(grid.size, limits.LIMITS.batch) * bytes_a_cell / 2**20, grid.size * _BYTES_A_CELL / 2**20
     parts = f"{duration(compiling)} to compile, {duration(seconds)} to compute, {duration(_AROUND)} to start and draw"
     total_time = duration(compiling + seconds + _AROUND)
     return (

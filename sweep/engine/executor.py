@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
+from sweep.engine import limits
 from sweep.engine.lives import DONE, Lives, Next
 from sweep.grid import Array
 from sweep.interrupt import point
@@ -14,9 +15,6 @@ from sweep.jit import threads
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import BLOCK, LANES
 from sweep.kernels.status import RUNNING
-
-CHUNK_SECONDS = 0.7
-"""Length of a chunk in s. Progress, checkpoints and Ctrl-C wait for the end of a chunk."""
 
 _SHORT = 0.05
 """Length of a chunk in s once lanes are idle: cells that have ended may continue."""
@@ -70,7 +68,7 @@ def _advance(lives: Lives, which: Array, blocks: int) -> int:
     kernel, rows = lives.cells.kernel, lives.rows
     table, began = kernel.table(rows), time.perf_counter()
     left = table["goal"][which] - table["done"][which]
-    least = max(1, int(blocks * _SHORT / CHUNK_SECONDS))
+    least = max(1, int(blocks * _SHORT / limits.LIMITS.chunk_seconds))
     taken = kernel.advance(rows, which[np.argsort(-left, kind="stable")], blocks, least)
     taken = max(1, taken // min(threads(), len(which)))
     return _rescale(taken, time.perf_counter() - began)
@@ -85,7 +83,7 @@ def execute(
     ----------
     rows : state rows, shape (cells, quantities)
     after_chunk : called after each chunk, when `rows` is consistent: to report, or stop by raising an exception
-    chunk_blocks : blocks of steps per chunk; by default as many as take about `CHUNK_SECONDS`
+    chunk_blocks : blocks of steps per chunk; by default those of `sweep.engine.limits`
     """
     status = kernel.table(rows)["status"]
     blocks = chunk_blocks or 1
@@ -100,8 +98,11 @@ def execute(
 
 
 def _rescale(blocks: int, seconds: float) -> int:
+    """Return the blocks of the next chunk, after one of so many `blocks` that took so many `seconds`."""
+    chunk = limits.LIMITS
     # When the last trajectories pause often, every call is short, and `blocks` would grow without bound.
-    return min(max(1, int(blocks * np.clip(CHUNK_SECONDS / seconds, 0.25, 8))), UNTIL_ALL_STOP)
+    wanted = min(max(1, int(blocks * np.clip(chunk.chunk_seconds / seconds, 0.25, 8))), UNTIL_ALL_STOP)
+    return chunk.chunk_blocks or wanted
 
 
 def nominal_seconds(steps: Array) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from sweep.config import Config
+from sweep.engine import limits
 from sweep.engine.life import live, progress
 from sweep.engine.lives import Lives
 from sweep.engine.outcome import results
@@ -18,9 +19,6 @@ from sweep.kernels.status import IMPOSSIBLE, SETTLED
 from sweep.prediction import predict
 from sweep.results.provenance import this_cpu
 from sweep.results.store import Running, Store
-
-BATCH = 32_768
-"""Cells simulated together (50 MB of state rows). Lanes idle only at the end of each batch of tiles."""
 
 Done = tuple[int, dict[str, Array]]
 """The number of a finished tile, its results by name, each of shape (cells,), its cost and the type of CPU."""
@@ -80,7 +78,7 @@ def batches(
     if left and set(left.tiles) <= set(todo):
         yield left.tiles, left
         todo = [i for i in todo if i not in left.tiles]
-    for batch in split(grid, tiles, todo, BATCH, len(todo)):
+    for batch in split(grid, tiles, todo, limits.LIMITS.batch, len(todo)):
         yield batch, None
 
 

@@ -11,15 +11,11 @@ import xarray as xr
 
 from sweep.config import Config
 from sweep.config.cross_checks import described_impossible
+from sweep.engine import limits
 from sweep.grid import Array, Tile
 from sweep.results import dataset, netcdf
 from sweep.results.provenance import provenance
 from sweep.results.store import Store
-
-
-def tile_size(cells: int) -> int:
-    """Cells per tile: a dying worker loses one tile, and the file stores one tile as a chunk."""
-    return int(np.clip(cells // 32, 1024, 8192))
 
 
 class Whole:
@@ -34,7 +30,7 @@ class Whole:
         """Add the tiles to simulate next: all of them, once. Return False if there are no more."""
         if self.tiles:
             return False
-        self.tiles = self.grid.tiles(tile_size(self.grid.size))
+        self.tiles = self.grid.tiles(limits.LIMITS.tile_of(self.grid.size))
         return True
 
     def simulated(self) -> Config:
@@ -64,7 +60,7 @@ class Whole:
 
     def _cut(self, cells: int) -> bool:
         """Simulate this many more cases, in separate tiles; return False if there are none."""
-        first, step = self.tiles[-1][0].stop if self.tiles else 0, tile_size(cells)
+        first, step = self.tiles[-1][0].stop if self.tiles else 0, limits.LIMITS.tile_of(cells)
         self.tiles += [(slice(i, min(i + step, first + cells)),) for i in range(first, first + cells, step)]
         return cells > 0
 

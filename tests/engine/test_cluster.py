@@ -21,7 +21,7 @@ from support import ROOT, Write
 from support.cli import invoke
 from support.kernels import threads
 from support.processes import python
-from support.runs import Heard, same_numbers
+from support.runs import Heard, limited, same_numbers
 from support.same import contents
 
 import sweep
@@ -110,12 +110,12 @@ def leave_none(client: distributed.Client, local: distributed.LocalCluster) -> N
     ids=["killed", "hung", "new", "none for a second"],
 )  # fmt: skip
 def test_workers_that_come_go_hang_and_lag_cost_only_their_tiles(
-    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Fault, lost: int
+    config: Path, tmp_path: Path, fault: Fault, lost: int
 ) -> None:
     """One worker of two is slow from the beginning; the fault comes with the first tile."""
-    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: cells // SMALL_TILES)
     expected = sweep.run(config)
     with (
+        limited(tile=expected.status.size // SMALL_TILES),
         dask.config.set({"distributed.scheduler.worker-ttl": "15s"}),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"

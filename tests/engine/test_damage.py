@@ -15,11 +15,10 @@ import pytest
 from click.testing import Result
 from support import SMALL, Write
 from support.cli import invoke, refused
-from support.runs import Heard, interrupt
+from support.runs import Heard, interrupt, limited, nothing_drawn
 from support.same import contents
 
 import sweep
-from sweep.engine import executor, local
 from sweep.faults import FileError
 from sweep.results import provenance
 from sweep.results.checkpoint import Checkpoint
@@ -32,10 +31,7 @@ TILE = 3
 
 @pytest.fixture(scope="module", autouse=True)
 def _many_tiles() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sweep.engine.whole.tile_size", lambda cells: TILE)  # noqa: ARG005
-        patch.setattr(local, "BATCH", 2 * TILE)
-        patch.setattr("sweep.engine.run._draw", lambda *_: None)  # `test_faults` has pictures
+    with limited(tile=TILE, batch=2 * TILE), nothing_drawn():  # `test_faults` has pictures
         yield
 
 
@@ -61,10 +57,8 @@ def half(config: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         if last_of_first.exists() and 3 in np.load(running)["tiles"]:
             interrupt()
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(executor, "_rescale", lambda *_: 20)
-        with pytest.raises(KeyboardInterrupt):
-            sweep.run(config, out, progress=Heard(stop_in_the_second_group))
+    with limited(tile=TILE, batch=2 * TILE, chunk_blocks=20), pytest.raises(KeyboardInterrupt):
+        sweep.run(config, out, progress=Heard(stop_in_the_second_group))
     return out
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import CHAOTIC, ENDS, ROOT, STANDARD, Write, adaptive, columns, newton
 from support.kernels import threads
-from support.runs import Heard, interrupt, lengthen, run_cells, same_numbers
+from support.runs import Heard, interrupt, lengthen, limited, run_cells, same_numbers
 
 import sweep
 from sweep.config import load_config
@@ -174,18 +174,16 @@ def test_no_energy_error_above_a_hundredth_without_a_failure(body: dict[str, flo
 
 
 @pytest.mark.parametrize(("size", "method"), [(1, "auto"), (3, "adams")])
-def test_tiles_and_threads_do_not_touch_the_numbers(monkeypatch: pytest.MonkeyPatch, size: int, method: str) -> None:
+def test_tiles_and_threads_do_not_touch_the_numbers(size: int, method: str) -> None:
     settings = {"method": method, "t_end": 5.0, "tolerance": 1e-9}
     whole = run_cells(MIXED, **settings)
     assert {TIME_LIMIT, *ENDS} <= set(whole.status.values.tolist())
     assert REPEAT in whole.step_rule
-    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr("sweep.engine.local.BATCH", 2 * size)
-    with threads(1):
-        same_numbers(run_cells(MIXED, **settings), whole)
-    same_numbers(
-        run_cells(MIXED[::-1], **settings).isel(case=slice(None, None, -1)).assign_coords(case=whole.case), whole
-    )
+    with limited(tile=size, batch=2 * size):
+        with threads(1):
+            same_numbers(run_cells(MIXED, **settings), whole)
+        found = run_cells(MIXED[::-1], **settings).isel(case=slice(None, None, -1))
+    same_numbers(found.assign_coords(case=whole.case), whole)
 
 
 @pytest.mark.usefixtures("short_chunks")

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from support import Write
-from support.runs import Heard, Stop, same_numbers
+from support.runs import Heard, Stop, limited, same_numbers
 
 import sweep
 from sweep import InputError
 from sweep.config import load_config
-from sweep.engine import local
 from sweep.engine.estimate import estimate
 from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.plots.marks import BLANK, legend, marks
@@ -75,14 +74,13 @@ def test_maps_leave_them_blank(edge: xr.Dataset) -> None:
 
 @pytest.mark.parametrize("size", [1, 4])
 def test_tiles_of_impossible_bodies_and_a_resumed_run(
-    edge: xr.Dataset, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int
+    edge: xr.Dataset, write: Write, tmp_path: Path, size: int
 ) -> None:
-    monkeypatch.setattr("sweep.engine.whole.tile_size", lambda cells: size)  # noqa: ARG005
-    monkeypatch.setattr(local, "BATCH", size)
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run(write(TEXT), tmp_path, progress=Stop(3))
     reporter = Heard()
-    found = swept(write(TEXT), tmp_path, progress=reporter)
+    with limited(tile=size, batch=size):
+        with pytest.raises(KeyboardInterrupt):
+            sweep.run(write(TEXT), tmp_path, progress=Stop(3))
+        found = swept(write(TEXT), tmp_path, progress=reporter)
     same_numbers(found, edge)
     assert (reporter.seen[-1].done, reporter.seen[-1].failed) == (18, 0)
 

@@ -11,13 +11,12 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
-from unittest.mock import patch
 
 import click
 import numpy as np
@@ -28,7 +27,7 @@ from hypothesis import event, note
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 from matplotlib.figure import Figure
-from support.runs import Stop, same_numbers
+from support.runs import Stop, limited, nothing_drawn, same_numbers
 
 import sweep
 from machine import draws, oracles, words
@@ -83,11 +82,6 @@ class Scene:
     def with_(self, changes: Flat, *without: str) -> dict[str, Any]:
         """What its file would say with some keys changed, and others left out."""
         return draws.nested({path: value for path, value in self.flat.items() if path not in without} | changes)
-
-
-def nothing_drawn(really: bool = True) -> Any:
-    """Runs without pictures, which take longer to draw than small runs."""
-    return patch("sweep.engine.run._draw", lambda *_: None) if really else nullcontext()
 
 
 class Logged(logging.Handler):
@@ -373,7 +367,7 @@ class Machine(RuleBasedStateMachine):
         whole = self.ask(verb, lambda: call(self.config, **taken))
         if whole is None:
             return
-        with patch("sweep.engine.executor._rescale", lambda *_: 200), nothing_drawn():
+        with limited(chunk_blocks=200), nothing_drawn():
             for sitting in range(2 + chunks):
                 with suppress(KeyboardInterrupt):
                     call(self.config, folder, progress=Stop(chunks + sitting), **taken)

@@ -23,7 +23,7 @@ from numba.np.ufunc import parallel
 
 from support.same import contents
 from sweep.cli import main
-from sweep.engine import executor, local, whole
+from sweep.engine import limits
 
 TILE = 3
 """Cells a tile; of twelve cells there are then six tiles in two groups."""
@@ -107,9 +107,7 @@ def command(arguments: list[str], log: Path, *, unprivileged: bool = False) -> N
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
     faulthandler.enable()
-    executor.CHUNK_SECONDS = 0.004
-    whole.tile_size = lambda cells: TILE  # noqa: ARG005
-    local.BATCH = 2 * TILE
+    limits.LIMITS = limits.Limits(chunk_seconds=0.004, tile=TILE, batch=2 * TILE)
     if unprivileged:
         _drop_capabilities()
     main(arguments)

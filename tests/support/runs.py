@@ -1,9 +1,11 @@
 """Runs that are interrupted, and whether two came to the same numbers."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import xarray as xr
 
 import sweep
 from support import STANDARD
+from sweep.engine.limits import Limits
 from sweep.kernels import methods
 from sweep.kernels.status import SETTLED
 
@@ -52,6 +55,18 @@ class Stop(Heard):
 
 def interrupt() -> None:
     raise KeyboardInterrupt
+
+
+@contextmanager
+def limited(**limits: Any) -> Iterator[None]:
+    """Divide runs by other `Limits`."""
+    with patch("sweep.engine.limits.LIMITS", Limits(**limits)):
+        yield
+
+
+def nothing_drawn() -> Any:
+    """Runs without pictures, which take longer to draw than small runs."""
+    return patch("sweep.engine.run._draw", lambda *_: None)
 
 
 def run_cells(bodies: Iterable[Mapping[str, float]], output: Path | None = None, **settings: Any) -> xr.Dataset:
