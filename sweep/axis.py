@@ -56,13 +56,12 @@ def contours(
     """Where `values`, of shape (y, x), pass through `level`: the x and y of each curve, in order, on lines of the grid.
 
     There is no curve beside values that are NaN, or with `corners` between three others, which may end on a diagonal.
-    With `to_edges` curves go on to the edges of the outer cells, where the values are those of these cells.
+    With `to_edges` curves go on to the edges of the outer cells, for which `values` have further rows and columns.
     """
-    if min(values.shape) < 2:
+    if min(len(x.values), len(y.values)) < 2:
         return
     across, up = (axis.straight(axis.values) for axis in (x, y))
     if to_edges:
-        values = np.pad(values, 1, mode="edge")
         across, up = (np.insert(axis.straight(axis.edges[[0, -1]]), 1, axis.straight(axis.values)) for axis in (x, y))
     generator = contour_generator(across, up, np.ma.masked_invalid(values), corner_mask=corners)
     for part in map(np.asarray, generator.lines(level)):

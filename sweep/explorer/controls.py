@@ -42,7 +42,7 @@ class MapControls:
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
         self.root = Row(children=[*self._widgets.values(), *self._limits.values()], name="controls",
                         stylesheets=[WIDGETS], sizing_mode="stretch_width",
-                        styles={"gap": "10px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
+                        styles={"gap": "10px 14px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:
         """Set the widgets to what is shown."""
@@ -63,12 +63,12 @@ class MapControls:
             value = CustomJSTickFormatter(args={"words": list(choice.words)}, code="return words[tick]")
             # Tooltips would read the words as HTML.
             slider = Slider(
-                start=0, end=len(choice.words) - 1, step=1, value=0, width=190, format=value, tooltips=False, **common
+                start=0, end=len(choice.words) - 1, step=1, value=0, width=150, format=value, tooltips=False, **common
             )
             on(slider, "value_throttled", partial(self._pick, choice))
             return slider
         named = list(zip(choice.options, choice.words, strict=True))
-        choose = Select(options=named, width=250 if choice.name == "show" else 150, **common)
+        choose = Select(options=named, width=230 if choice.name == "show" else 140, **common)
         on(choose, "value", lambda option: self._pick(choice, choice.find(option)))
         return choose
 
@@ -79,7 +79,7 @@ class MapControls:
 
     def _limit(self, name: str, words: str) -> TextInput:
         """Make the field of an end of the colour scale; without a number, the values set that end."""
-        field = TextInput(title=words, placeholder="auto", width=80, name=name,
+        field = TextInput(title=words, placeholder="auto", width=72, name=name,
                           stylesheets=[BARE])  # fmt: skip
 
         def put(state: State, at: float) -> State:
@@ -103,7 +103,8 @@ class BodyControls:
         self._sliders = {name: self._slider(source, name, value) for name, value in values.items()}
         self._back = Button(label="Back to the dataset", name="back", width=150, visible=False)
         self._back.on_click(lambda: change(lambda state: replace(state, changed={})))
-        words = Div(text="Counts of another body:", styles={"font-size": "12px", "color": "#5b6875"}, width=150)
+        heading = {"font-size": "12px", "color": "#5b6875", "flex": "1 0 100%"}
+        words = Div(text="Counts of another body:", styles=heading)
         self.root = Row(words, *self._sliders.values(), self._back, name="other", visible=bool(values),
                         stylesheets=[WIDGETS], sizing_mode="stretch_width",
                         styles={"gap": "6px 18px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip

@@ -66,7 +66,8 @@ class Curves:
             spins = theory.levels(chosen.dataset) if chosen else []
             self._critical.data = {
                 "spin": [at for _, _, at, _ in spins],
-                "time": [end * (0.85 if name == "n_c1" else 1.0) for name, *_ in spins],  # they often lie close
+                # Side by side, because they often lie close.
+                "time": [end * {"n_c1⁺": 0.87, "n_c1⁻": 0.74}.get(sign, 1.0) for _, sign, *_ in spins],
                 "dash": [theory.OVER_TIME[name] for name, *_ in spins],
                 "symbol": [sign for _, sign, *_ in spins],
             }

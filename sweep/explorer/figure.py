@@ -24,7 +24,7 @@ from sweep.explorer.slices import PlacedAxis, Source, plain
 from sweep.explorer.state import State
 from sweep.explorer.style import TILES
 from sweep.kernels.measures.reversals import Reversals
-from sweep.plots import labels, marks, places, theory
+from sweep.plots import description, labels, marks, places, theory
 from sweep.plots.description import Map, describe
 from sweep.plots.scales import Scale
 from sweep.plots.theory import Line
@@ -146,14 +146,19 @@ class MapFigure:
         """Label the bar, the cuts and the tooltips for a scale."""
         for cut in self._cuts:
             words = (scale.ticks or {}) if part.flags else {}
-            ticker = models.FixedTicker(ticks=list(words), minor_ticks=[]) if words else models.BasicTicker()
+            whole = 1 if part.values.dtype.kind in "iu" else 0
+            ticker = models.BasicTicker(min_interval=whole, desired_num_ticks=4)
+            if words:
+                ticker = models.FixedTicker(ticks=list(words), minor_ticks=[])
             cut["plot"].yaxis.update(ticker=ticker, major_label_overrides=words)
         # A new bar, because an old one omits ticks beyond its first scale.
         self.figure.right = [_bar(unit, scale, mapper)]
         flags = {str(k): words for k, words in part.flags.items()}
-        code = "return words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')"
-        self._hover.tooltips = [(self._source.words(part.name), "@image{custom}")]
-        self._hover.formatters = {"@image": models.CustomJSHover(args={"words": flags}, code=code)}
+        code = "return `${name}: ${words[value] ?? (Number.isFinite(value) ? sweep.number(value) : 'none')}`"
+        # Words are part of the value, because Bokeh writes labels in a blue that is hard to read.
+        self._hover.tooltips = [("", "@image{custom}")]
+        known = {"words": flags, "name": self._source.words(part.name)}
+        self._hover.formatters = {"@image": models.CustomJSHover(args=known, code=code)}
 
 
 def _bar(unit: str, scale: Scale, mapper: Any) -> models.ColorBar:
@@ -203,12 +208,12 @@ def _pins(plot: Any) -> ColumnDataSource:
 
 def _frame(source: Source, across: PlacedAxis, up: PlacedAxis) -> Any:
     """The empty figure, with axes that suit the spacing of the values."""
-    x, y = across.drawn_edges, up.drawn_edges
+    x, y = (axis.place(description.ends(source.dataset, axis)) for axis in (across, up))
     plot = figure(
         height=HEIGHT if up.name else 240,
         sizing_mode="stretch_width", min_width=240,
-        x_range=models.Range1d(x[0], x[-1], bounds=(x[0], x[-1])),
-        y_range=models.Range1d(y[0], y[-1], bounds=(y[0], y[-1])),
+        x_range=models.Range1d(*x, bounds=tuple(x)),
+        y_range=models.Range1d(*y, bounds=tuple(y)),
         x_axis_type=style.kind(across),
         y_axis_type=style.kind(up),
         x_axis_label=source.label(across.name),

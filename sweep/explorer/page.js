@@ -165,13 +165,13 @@ const sweep = (() => {
 
   function key(event) {
     if (!current || event.ctrlKey || event.altKey || event.metaKey) return
-    const {cursor, request, probe, ex, ey} = current
-    const clamp = (at, edges) => Math.max(0, Math.min(edges.length - 2, at))
+    const {cursor, request, probe, ex, ey, figure} = current
+    const clamp = (at, edges, {bounds: [, end]}) => Math.max(0, Math.min([...edges].filter((edge) => edge < end).length - 1, at))
     const [i, j] = chosen(cursor)
     if (event.key in STEPS) {
       const [di, dj] = STEPS[event.key]
       const stride = event.shiftKey ? 10 : 1
-      const next = i < 0 ? [0, 0] : [clamp(i + stride * di, ex), clamp(j + stride * dj, ey)]
+      const next = i < 0 ? [0, 0] : [clamp(i + stride * di, ex, figure.x_range), clamp(j + stride * dj, ey, figure.y_range)]
       choose(...next)
       tell(probe, ...next)
       announce(...next)

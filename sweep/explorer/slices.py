@@ -19,7 +19,7 @@ from sweep.grid import Array
 from sweep.plots import labels, marks, quantities
 from sweep.plots.description import Map, along, describe
 from sweep.plots.pictures import of
-from sweep.results.dataset import FURTHER
+from sweep.results.dataset import FURTHER, never_settles
 from sweep.results.kind import kind, opened
 from sweep.results.netcdf import open_dataset
 
@@ -110,7 +110,7 @@ class Source:
     @cached_property
     def _notes(self) -> dict[str, str]:
         """The words for a cell of each kind."""
-        endless = "status" in self.dataset and marks.never_settles(self.dataset)
+        endless = "status" in self.dataset and never_settles(self.dataset)
         return marks.WORDS | ({"time_limit": marks.UNBOUNDED} if endless else {})
 
     def label(self, name: str) -> str:

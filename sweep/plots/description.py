@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ class Map:
     legend: dict[str, str]
     """Legend entries of the kinds that occur and are marked."""
     notes: tuple[str, ...]
-    """Sentences on kinds that more than half of the cells share, which are not marked."""
+    """Sentences on kinds that more than half of the cells share, which are not marked, and on cells not drawn."""
     flags: dict[int, str]
     """The meaning of each value; empty if they are numbers."""
     lines: list[Line]
@@ -79,17 +79,27 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "", shared: Mappin
     return Map(
         name, across, up, table(found, across, up),
         {kind: table(where & (kind not in notes), across, up) for kind, where in kinds.items()},
-        words, tuple(notes.values()), labels.flag_words(dataset.assign({name: found}), name), lines,
-        (_ends(dataset, across), _ends(dataset, up)),
+        words, (*notes.values(), *_wider(dataset, across, up)),
+        labels.flag_words(dataset.assign({name: found}), name), lines,
+        (ends(dataset, across), ends(dataset, up)),
     )  # fmt: skip
 
 
-def _ends(dataset: xr.Dataset, axis: Axis) -> Array:
-    """Return the edges of the outer cells, but not beyond b = a, where the semi-axes would change their names."""
+def ends(dataset: xr.Dataset, axis: Axis) -> Array:
+    """Return the ends of a drawn axis: the edges of the outer cells, or b = a if the axis passes it.
+
+    Beyond b = a the semi-axes would change their names.
+    """
     low, high = axis.edges[[0, -1]]
-    if axis.name == "b" and "a" in dataset and not dataset["a"].ndim and axis.values[-1] <= dataset["a"]:
+    if axis.name == "b" and "a" in dataset and not dataset["a"].ndim and axis.values[0] < dataset["a"]:
         high = min(high, float(dataset["a"]))
     return np.array([low, high])
+
+
+def _wider(dataset: xr.Dataset, *axes: Axis) -> Iterator[str]:
+    """Say that cells with b > a are not drawn, if there are any."""
+    if any(axis.values[-1] > ends(dataset, axis)[1] for axis in axes):
+        yield "cells with b > a are not drawn"
 
 
 def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
@@ -99,7 +109,8 @@ def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
     words = "boundary of counts"
     curves = {
-        level: list(contours(counts.distance(level), x, y, corners=True, to_edges=True)) for level in counts.levels()
+        level: list(contours(np.pad(counts.distance(level), 1, mode="edge"), x, y, corners=True, to_edges=True))
+        for level in counts.levels()
     }
     return [Line("boundary", words, parts, f"{level}") for level, parts in curves.items() if parts]
 

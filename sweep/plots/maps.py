@@ -63,7 +63,8 @@ def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Shee
             words = labels.common(dataset, group[-1]) if panels.compared else labels.label(dataset, group[-1])
             _bar(of_group, words, scales[group[-1]], int(width * RATIO * rows / _TICK))
     meanings = _meanings(panels, maps, scales[names[0]], shared)
-    figure.explain([*meanings, *entries.values()], notes=shared.values())
+    notes = dict.fromkeys(note for each in maps for shown in each.values() for note in shown.notes)
+    figure.explain([*meanings, *entries.values()], notes=notes)
     return figure
 
 

@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 
 from sweep.grid import Array
-from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
+from sweep.kernels.status import FAILURES, IMPOSSIBLE, TIME_LIMIT, Doubt
 from sweep.plots.labels import is_code
 from sweep.plots.pictures import of
 from sweep.plots.quantities import field
-from sweep.results.dataset import STATUS_WORDS, uncertain
+from sweep.results.dataset import STATUS_WORDS, never_settles, uncertain
 
 WORDS = {
     "not_run": "not run",
@@ -91,11 +91,6 @@ def with_results(dataset: xr.Dataset, name: str) -> Array:
     found, kinds = field(dataset, name), marks(dataset, name)
     values, *blank = xr.broadcast(found, *(kinds[kind] for kind in BLANK))
     return np.asarray(values.values[~np.any([where.values for where in blank], axis=0)])
-
-
-def never_settles(dataset: xr.Dataset) -> bool:
-    """Return whether no cell has settled, as in a model that cannot: its counts grow with the time limit for ever."""
-    return not (dataset["status"] == SETTLED).any()
 
 
 def _meaning(dataset: xr.Dataset, name: str, kind: str) -> str:

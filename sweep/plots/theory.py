@@ -139,18 +139,35 @@ def _best_words(b: float) -> str:
 def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
     """Draw a critical spin over the axis other than n0."""
     spin, other = (x, y) if x.name == "n0" else (y, x)
-    along = _axis(values, other).values
-    spins = np.broadcast_to(values.values, along.shape).astype(float)
+    axis = _axis(values, other)
+    along, spins = axis.values, np.broadcast_to(values.values, axis.values.shape).astype(float)
     if not ((spin.values[0] <= spins) & (spins <= spin.values[-1])).any():
         return []
+    if other.name in values.dims and len(along) > 1:
+        first, last = axis.edges[[0, -1]]
+        along = np.concatenate([[first], along, [last]])
+        inverse = _to_edges(1 / spins)
+        spins = np.divide(1, inverse, out=np.full_like(inverse, np.nan), where=inverse != 0)
     return [(spins, along) if spin is x else (along, spins)]
+
+
+def _to_edges(inverse: Array) -> Array:
+    """Continue 1/n_c, which is proportional to μ, in a straight line to the edges of the outer cells, or else to zero.
+
+    It is zero where the body is round, and nowhere changes its sign.
+    """
+    level = np.pad(inverse, 1, mode="edge")
+    straight = (level + np.pad(inverse, 1, mode="reflect", reflect_type="odd")) / 2
+    return np.where(straight * level < 0, 0.0, straight)
 
 
 def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
     """Return the contours on which a critical spin equals the start spin of the map."""
     across, up = _axis(values, x), _axis(values, y)
     field = table(values, across, up)
-    return list(contours(1 / field, across, up, 1 / n0)) if n0 else []  # n_c is infinite for a round body
+    if not n0:
+        return []
+    return list(contours(_to_edges(1 / field), across, up, 1 / n0, to_edges=True))  # n_c is infinite for a round body
 
 
 def table(array: xr.DataArray, x: Axis, y: Axis) -> Array:

@@ -215,6 +215,11 @@ def uncertain(dataset: xr.Dataset) -> xr.DataArray:
     return counted & (dataset["doubts"] & int(COUNT_DOUBTS) > 0)
 
 
+def never_settles(dataset: xr.Dataset) -> bool:
+    """Return whether no cell has settled, as in a model that cannot: its counts grow with the time limit for ever."""
+    return not (dataset["status"] == SETTLED).any()
+
+
 def check_names(config: Config, series: Iterable[str] = ()) -> None:
     """Raise an `InputError` if a parameter has the name of a variable or dimension, or of one of these `series`."""
     own = {*VARIABLES, *PROBABILITIES, *ROWS, *FURTHER, *series}

@@ -12,7 +12,7 @@ import xarray as xr
 from sweep.faults import counted, duration
 from sweep.kernels.method import STEP_RULES
 from sweep.kernels.status import FAILURES, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
-from sweep.results.dataset import DOUBTS, REASONS, STATUSES, TRAJECTORIES, along_one, uncertain
+from sweep.results.dataset import DOUBTS, REASONS, STATUSES, TRAJECTORIES, along_one, never_settles, uncertain
 from sweep.results.kind import BOUNDARIES, CRITICAL, FIT, SPINS, TRAJECTORY, Kind, kind, parameters
 from sweep.results.margins import FOUND, UNCERTAIN, WIDE
 from sweep.results.probabilities import PROBABILITIES
@@ -67,7 +67,8 @@ def _boundaries(dataset: xr.Dataset) -> Iterator[str]:
     if off := int(dataset.attrs.get("middles_off", 0)):
         yield f"lost {off}: the boundary was not found halfway between two points, so the curve is split there"
     if early := int(dataset.attrs.get("cells_not_final", 0)):
-        yield f"not final {early}: counts of grid cells are lower bounds; a longer t_end makes them final"
+        remedy = "; a longer t_end makes them final" if points else ""  # a model that never settles has no points
+        yield f"not final {early}: counts of grid cells are lower bounds{remedy}"
     if pairs := int(dataset.attrs.get("pairs_not_searched", 0)):
         yield f"not searched {pairs}: pairs of neighbours whose counts differ, where a count is not final or missing"
     if uncertain := int((dataset["outcome"] == UNCERTAIN).sum()):
@@ -190,7 +191,8 @@ def _doubts(dataset: xr.Dataset, counts: int) -> Iterator[str]:
         these = left & (doubts & int(bit) > 0)
         left &= ~these
         if these.any():
-            yield f"  {int(these.sum())}{_place(these)}: {words}; {remedy}"
+            helps = bit != Doubt.TIME_LIMIT or not never_settles(dataset)
+            yield f"  {int(these.sum())}{_place(these)}: {words}{f'; {remedy}' if helps else ''}"
     if missed := int((doubts & int(Doubt.TOLERANCE) > 0).sum()):
         error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
         yield f"{missed} of {counted(counts, 'cell')} {'misses' if missed == 1 else 'miss'} the tolerance{error}"

@@ -113,6 +113,14 @@ def test_the_last_lines_of_a_run_say_which_counts_are_certain_and_what_to_do_abo
     ]
 
 
+def test_a_longer_run_is_advised_only_if_some_cells_settle() -> None:
+    doubts = {"certain": ("mu", [0, 0]), "doubts": ("mu", [int(Doubt.TIME_LIMIT)] * 2)}
+    for status, advised in (([2, 1], True), ([2, 2], False)):
+        text = summary(status=("mu", np.array(status, "int8")), reversals=("mu", [1, 2]), **doubts)
+        assert "more reversals may follow" in text
+        assert ("raise t_end" in text) == advised
+
+
 def test_a_status_that_was_averaged_is_no_status() -> None:
     assert summary(status=("mu", [1.5, 2.0])) == "no status of individual cells: averaged"
 

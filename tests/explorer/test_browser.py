@@ -209,6 +209,21 @@ def tip(page: Page, i: int, j: int) -> str:
     return str(page.locator(".bk-tooltip-content").first.text_content())
 
 
+def contrast(box: Locator) -> float:
+    """The smallest contrast of the words in a box with its ground, by the formula of WCAG 2."""
+    worded = "(e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())"
+    inks = box.locator("*").evaluate_all(f"(all) => all.filter({worded}).map((e) => getComputedStyle(e).color)")
+    ground = box.evaluate("e => getComputedStyle(e).backgroundColor")
+
+    def luminance(colour: str) -> float:
+        share = np.array(re.findall(r"[\d.]+", colour)[:3], float) / 255
+        linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+        return float(linear @ [0.2126, 0.7152, 0.0722]) + 0.05
+
+    ratios = [luminance(ink) / luminance(ground) for ink in inks]
+    return min(max(ratio, 1 / ratio) for ratio in ratios)
+
+
 def resize(page: Page, width: int) -> None:
     """Give the window another width, and wait until the figures fit and the server has painted the patterns anew."""
     page.set_viewport_size({"width": width, "height": 950})
@@ -286,6 +301,14 @@ def test_the_map_shows_the_dataset(clicked: Page, opened: xr.Dataset, counts: np
     legend = text(clicked, "legend")
     for words in ("lower bound", "failed: 1 lifted off the table", "limited by round-off"):
         assert words in legend
+
+
+def test_a_map_ends_where_the_semi_axes_are_equal(opened: xr.Dataset) -> None:
+    from sweep.explorer.figure import MapFigure
+
+    shown = MapFigure(Source(opened.assign_coords(a=3.5)), "b", "mu").figure
+    assert shown.x_range.bounds == (1.5, 3.5)
+    assert shown.y_range.bounds == (35, 85)
 
 
 def test_boundaries_have_their_counts(clicked: Page, counts: np.ndarray) -> None:
@@ -678,14 +701,18 @@ def test_the_page_is_dark_where_the_system_is(visit: Open, opened: xr.Dataset) -
         return [float(np.median(np.asarray(part))) for part in parts]
 
     assert min(grounds()) > 240
+    tip(page, 1, 1)
+    assert contrast(page.locator(".bk-Tooltip").first) > 4.5
     page.emulate_media(color_scheme="dark")
     page.reload()
     settle(page)
     wait_for_curves(page, 1)
     assert max(grounds()) < 60
     tip(page, 1, 1)
-    colour = page.locator(".bk-Tooltip").first.evaluate("e => getComputedStyle(e).backgroundColor")
+    tooltip = page.locator(".bk-Tooltip").first
+    colour = tooltip.evaluate("e => getComputedStyle(e).backgroundColor")
     assert max(map(int, re.findall(r"\d+", colour)[:3])) < 60
+    assert contrast(tooltip) > 4.5
     counts = opened["reversals"].isel(n0=N0).values
     assert (pixels(page, 2, 2) == colour_in_palette(page, int(counts[2, 2]))).all(axis=1).mean() > 0.8
     page.get_by_role("button", name="Light or dark page").click()

@@ -171,10 +171,12 @@ def test_a_map_without_a_title_has_none_at_all(variable: str) -> None:
     assert figure.get_suptitle() == ""
 
 
-def test_a_map_ends_where_the_semi_axes_are_equal() -> None:
-    near, beyond = np.linspace(2, 9.8, 8), np.linspace(2, 12, 8)
-    for b, end in ((near, 10), (beyond, beyond[-1] + 5 / 7)):
-        assert maps(picture.plot(made(b=b), "reversals"))[0].get_xlim()[1] == pytest.approx(end)
+def test_a_map_ends_where_the_semi_axes_are_equal_and_says_which_cells_it_leaves_out() -> None:
+    near, past, beyond = np.linspace(2, 9.8, 8), np.linspace(2, 12, 8), np.linspace(11, 18, 8)
+    for b, end in ((near, 10), (past, 10), (beyond, 18.5)):
+        figure = picture.plot(made(b=b), "reversals")
+        assert maps(figure)[0].get_xlim()[1] == pytest.approx(end)
+        assert ("b > a" in figure.legends[0].get_title().get_text()) == (b is past)
 
 
 def test_boundaries_reach_the_frame() -> None:
@@ -244,7 +246,7 @@ def test_the_critical_spins_are_contours_where_they_equal_the_start_spin() -> No
     for name, factor in (("n_c1", 1.0), ("n_c2", 2.0)):
         (line,) = [line for line in axes.lines if line.get_gid() == name]
         np.testing.assert_allclose(line.get_ydata(), factor / 0.02, rtol=0.05)
-        assert np.ptp(line.get_xdata()) == 7
+        assert np.ptp(line.get_xdata()) == 8
 
 
 def test_no_contour_of_a_spin_of_the_other_sign() -> None:
