@@ -98,7 +98,7 @@ def execute(
 
 
 def _rescale(blocks: int, seconds: float) -> int:
-    """Return the blocks of the next chunk, after one of so many `blocks` that took so many `seconds`."""
+    """Return the blocks of the next chunk, after one of `blocks` blocks that took `seconds`."""
     chunk = limits.LIMITS
     # When the last trajectories pause often, every call is short, and `blocks` would grow without bound.
     wanted = min(max(1, int(blocks * np.clip(chunk.chunk_seconds / seconds, 0.25, 8))), UNTIL_ALL_STOP)

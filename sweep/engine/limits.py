@@ -22,7 +22,7 @@ class Limits:
     """Cells simulated together (50 MB of state rows).  Lanes idle only at the end of each batch of tiles."""
 
     def tile_of(self, cells: int) -> int:
-        """Return the cells per tile of a run of so many `cells`."""
+        """Return the cells per tile of a run of this many `cells`."""
         return self.tile or int(np.clip(cells // 32, 1024, 8192))
 
 
