@@ -198,7 +198,9 @@ def _physics(values: Any, origin: Origin | None, names: frozenset[str]) -> Physi
     if isinstance(made, Model):  # a user's model gives the units itself
         return Physics(made.units, LAWS[PAPER_LAW], ELLIPSOID, names)
     law = made.law if made else LAWS[values.friction.law]
-    return Physics(values.units, law, SURFACES[values.body.surface], names, Assembly(values.body.solid))
+    return Physics(
+        values.units, law, SURFACES[values.body.surface], names, Assembly(values.body.solid, values.body.weights)
+    )
 
 
 def _parameters(

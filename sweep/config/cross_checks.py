@@ -44,14 +44,22 @@ def of_physics(values: Any, physics: Physics, origin: Origin | None) -> Iterator
         yield ("model",), f"the {values.model} model does not support {unknown}; choose {either(BASES)}"
         return
     yield from ((PARAMETERS[name].place, reason) for name, reason in physics.misfits().items())
-    if solid := physics.assembly.solid:
-        for names in solid.needs:
-            if not {*names} & physics.names:
-                yield ("body",), f"a size of the solid is missing; add {either(names)}"
-        if physics.units != SI:
-            yield ("units",), "sizes of a solid are in SI; set units: SI"
-        if physics.surface != ELLIPSOID:
-            yield ("body", "surface"), "cannot be combined with a solid, whose surface is an ellipsoid; leave it out"
+    yield from _of_assembly(physics)
+
+
+def _of_assembly(physics: Physics) -> Iterator[Misfit]:
+    """Check that the solid has its sizes, and that the weights leave the centre of mass above the lowest point."""
+    solid, weights = physics.assembly.solid, physics.assembly.weights
+    if (solid or weights) and physics.units != SI:
+        yield ("units",), "solids and weights are in SI; set units: SI"
+    for names in solid.needs if solid else ():
+        if not {*names} & physics.names:
+            yield ("body",), f"a size of the solid is missing; add {either(names)}"
+    if solid and physics.surface != ELLIPSOID:
+        yield ("body", "surface"), "cannot be combined with a solid, whose surface is an ellipsoid; leave it out"
+    if weights and (off := physics.assembly.sideways).any():
+        words = "have their centre of mass at {:.3g} m along a and {:.3g} m along b, where no model has it".format(*off)
+        yield ("body", "weights"), f"{words}; put as much at [-x, -y] as at [x, y]"
 
 
 def of_values(config: Config, given: Mapping[str, Values]) -> Iterator[Misfit]:

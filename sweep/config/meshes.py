@@ -137,10 +137,9 @@ def _standing(volume: float, inertia: NDArray[np.float64], points: NDArray[np.fl
     c = 1 / np.clip(flat, _LOWEST / height, 1 / depth)
     along, _ = axes.T
     turn = np.array([[*along, 0], [along[1], -along[0], 0], [0, 0, -1]])
-    surface = {"a": np.sqrt(c / curvatures[0]), "b": np.sqrt(c / curvatures[1]), "c": c, "offset": c - depth}
+    surface = (*np.sqrt(c / curvatures), c, c - depth)
     misfit = np.abs(terms @ [k1, k12, k2, flat, *slope, shift] - 2 * h).max() / 2
     J = turn @ inertia @ turn.T
     J[np.abs(J) < _NOTHING * J[2, 2]] = 0
-    moments = {f"J{'xyz'[i]}{'xyz'[j]}": J[i, j] for i in range(3) for j in range(i, 3)}
-    numbers = {name: float(each) for name, each in (surface | moments).items()}
-    return Shape(volume=float(volume), **numbers), float(misfit)
+    numbers = (volume, *surface, *np.diag(J), J[0, 1], J[0, 2], J[1, 2])
+    return Shape(tuple(map(float, numbers))), float(misfit)

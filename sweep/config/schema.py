@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from math import isfinite
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, create_model, model_validator
@@ -12,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from sweep.config.document import is_number
 from sweep.config.messages import Allowed, wrong
-from sweep.config.values import MAX_AXIS, Strict, Whole, in_si, parse_values, whole
+from sweep.config.values import MAX_AXIS, Strict, Whole, check_number, in_si, parse_values, whole
 from sweep.faults import either, refusal
 from sweep.kernels.measures import MEASURES
 from sweep.kernels.method import TOLERANCE
@@ -25,7 +24,7 @@ from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.variants import PAPER_LAW
 from sweep.parameters import PARAMETERS, Parameter, sections
-from sweep.units import PAPER_UNITS, SI, TIME
+from sweep.units import LENGTH, MASS, PAPER_UNITS, SI, TIME
 
 
 def _measures(raw: Any) -> Any:
@@ -164,18 +163,35 @@ _SOLID = f"{either(SOLIDS)}, or the numbers that `sweep body --stl` prints"
 
 def _solid(raw: Any) -> Any:
     """Return a solid whose sizes are parameters, by its name or by the numbers of a `Shape`."""
-    if not isinstance(raw, dict):
-        if raw not in SOLIDS:
-            raise wrong(refusal(raw, _SOLID, SOLIDS))
-        return SOLIDS[raw]
-    for name, kind in Shape.__dataclass_fields__.items():
-        positive = name in ("volume", "a", "b", "c", *(f"J{axis}{axis}" for axis in "xyz"))
-        value = raw.get(name, 0.0 if kind.default == 0.0 else None)
-        if not is_number(value) or not isfinite(value) or (positive and value <= 0):
-            raise wrong(refusal(value, f"a finite number{' > 0' if positive else ''}, in SI"), name)
-    if unknown := raw.keys() - Shape.__dataclass_fields__:
-        raise wrong(f"unknown key; the keys here are {', '.join(Shape.__dataclass_fields__)}", min(unknown))
-    return Shape(**raw)
+    if isinstance(raw, dict) and [*raw] == [*Shape.names]:
+        parameters = (PARAMETERS.get(name.replace("J", "I"), PARAMETERS["mass"]) for name in raw)
+        if all(is_number(each) and p.allows(each) for each, p in zip(raw.values(), parameters, strict=True)):
+            return Shape(tuple(map(float, raw.values())))
+    if raw not in [*SOLIDS]:
+        raise wrong(refusal(raw, _SOLID, SOLIDS))
+    return SOLIDS[raw]
+
+
+_WEIGHT = "a mass and a place such as {mass: 5 g, at: [4 cm, 1 cm, 0.5 cm]}"
+
+
+def _weights(raw: Any) -> Any:
+    """Return mass and place of each weight, in SI."""
+    if not isinstance(raw, list):
+        raise wrong(refusal(raw, f"a list of weights, each {_WEIGHT}"))
+    return tuple(_weight(each, i) for i, each in enumerate(raw))
+
+
+def _weight(raw: Any, i: int) -> tuple[float, ...]:
+    if not isinstance(raw, dict) or raw.keys() != {"mass", "at"}:
+        raise wrong(refusal(raw, _WEIGHT), i)
+    if not isinstance(raw["at"], list) or len(raw["at"]) != 3:
+        raise wrong(refusal(raw["at"], "three lengths, along a, along b and down"), i, "at")
+    (mass, _), (at, _) = in_si(MASS, raw["mass"]), in_si(LENGTH, raw["at"])
+    check_number(mass, PARAMETERS["mass"], i, "mass")
+    for j, each in enumerate(at):
+        check_number(each, PARAMETERS["offset"], i, "at", j)
+    return tuple(map(float, (mass, *at)))
 
 
 class Friction(Strict):
@@ -188,6 +204,11 @@ class Body(Strict):
     )
     solid: Annotated[Any, BeforeValidator(_solid), Allowed(_SOLID)] = Field(
         default=None, description="homogeneous solid whose sizes determine surface and inertia of the body"
+    )
+    weights: Annotated[Any, BeforeValidator(_weights), Allowed("a list of weights")] = Field(
+        default=(),
+        description="weights on the body, each with its mass and its place along `a`, along `b` and down, from the "
+        "centre of the ellipsoid",
     )
 
 

@@ -95,12 +95,12 @@ def _parse(parameter: Parameter, raw: Any) -> Values:
     if isinstance(raw, dict):
         return _parse_distribution(parameter, raw) if raw.keys() & FAMILIES.keys() else _parse_range(parameter, raw)
     if not isinstance(raw, list):
-        _check_number(raw, parameter)
+        check_number(raw, parameter)
         return Values.one(float(raw))
     if not raw:
         raise wrong("axis is empty; give at least one value")
     for i, item in enumerate(raw):
-        _check_number(item, parameter, i)
+        check_number(item, parameter, i)
     return _axis([float(item) for item in raw])
 
 
@@ -179,7 +179,8 @@ def _axis(numbers: list[float], spec: Any = None) -> Values:
     return Values(tuple(numbers), True, spec or numbers)
 
 
-def _check_number(raw: Any, parameter: Parameter, *at: int) -> None:
+def check_number(raw: Any, parameter: Parameter, *at: int | str) -> None:
+    """Refuse a value that is not a number which the parameter allows; it stands at the path `at` inside its own."""
     if not is_number(raw) or not parameter.allows(raw):
         hint = instead(raw, parameter)
         more = "" if is_number(raw) or at or hint else _MORE

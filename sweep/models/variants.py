@@ -111,7 +111,7 @@ class Physics:
 
     def variant(self, base: str) -> Model:
         """The variant of `slip` or `noslip` for it, with the parameters that follow from the named ones."""
-        homogeneous = self.surface.homogeneous and not self.names & {*INERTIA}
+        homogeneous = self.surface.homogeneous and not (self.names & {*INERTIA} or self.assembly.weights)
         moments = ("delta",) if homogeneous else INERTIA
         system = SI_ALONE if self.units == SI else ()
         by_angles = (*starts.ANGLES, *(starts.SLIP if base == "slip" else ()))

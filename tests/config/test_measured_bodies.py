@@ -93,6 +93,84 @@ def test_a_configuration_and_a_dataset_are_read_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again["spin"], straight["spin"])
 
 
+def columns(body: dict[str, object]) -> dict[str, float]:
+    """The parameters of the models for a body."""
+    found = load_config({"body": body, **REST, "start": {"n0": 5, "x0": 0, "y0": 0}}).grid.columns()
+    return {name: float(values[0]) for name, values in found.items()}
+
+
+def of_points(masses: np.ndarray, at: np.ndarray) -> dict[str, float]:
+    """Mass, depth and central moments of points, by their definitions; `at` has the shape (points, 3), z down."""
+    centre = masses @ at / masses.sum()
+    x, y, z = (at - centre).T
+    sums = {"Ixx": y * y + z * z, "Iyy": x * x + z * z, "Izz": x * x + y * y}
+    sums |= {"Ixy": -x * y, "Ixz": -x * z, "Iyz": -y * z}
+    return {"mass": masses.sum(), "offset": centre[2], **{name: masses @ each for name, each in sums.items()}}
+
+
+def points_of_half(a: float, b: float, c: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shares and places, z down from the flat top, of points that integrate second moments of the solid exactly."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    z, r, phi = np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2, np.arange(8) * np.pi / 4, indexing="ij")
+    share = weights[:, None, None] * weights[:, None] * r * (1 - z**2)
+    rim = r * np.sqrt(1 - z**2)
+    places = np.stack([a * rim * np.cos(phi), b * rim * np.sin(phi), c * z], axis=-1)
+    return (share / share.sum()).ravel(), places.reshape(-1, 3)
+
+
+PAIRS = st.lists(
+    st.tuples(st.floats(1e-3, 0.1), st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(-0.01, 0.01)),
+    min_size=1, max_size=4,
+)  # fmt: skip
+
+
+@settings(max_examples=50, deadline=None)
+@given(pairs=PAIRS, lower=st.floats(-0.005, 0.005))
+def test_weights_add_what_their_points_add(pairs: list[tuple[float, ...]], lower: float) -> None:
+    """Of each pair, one weight is `lower` than the other, so that the third axis need not be one of inertia."""
+    rows = np.array([(m, s * x, s * y, z + (s < 0) * lower) for m, x, y, z in pairs for s in (1, -1)])
+    weights = [{"mass": mass, "at": at} for mass, *at in rows.tolist()]
+    found = columns({"solid": "half_ellipsoid", "length": 0.2, "width": 0.14, "height": 0.03, "mass": 0.5,
+                     "weights": weights})  # fmt: skip
+    share, places = points_of_half(0.1, 0.07, 0.03)
+    expected = of_points(np.append(0.5 * share, rows[:, 0]), np.append(places, rows[:, 1:], axis=0))
+    for name, value in expected.items():
+        assert found.get(name, 0.0) == pytest.approx(value, rel=1e-9, abs=1e-11 * expected["Izz"]), name
+
+
+def test_weights_are_added_to_a_body_of_given_inertia() -> None:
+    body = {"a": 0.2, "b": 0.03, "c": 0.02, "offset": 0.01, "mass": 1.0, "Ixx": 2e-4, "Iyy": 1.6e-3, "Izz": 1.7e-3}
+    found = columns({**body, "weights": [{"mass": "50 g", "at": [f"{s}5 cm", f"{s}1 cm", "1 cm"]} for s in ("", "-")]})
+    expected = {"mass": 1.1, "offset": 0.01, "Ixx": 2e-4 + 1e-5, "Iyy": 1.6e-3 + 2.5e-4, "Izz": 1.7e-3 + 2.6e-4}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+    assert found["Ixy"] == pytest.approx(-5e-5, rel=1e-12)
+
+
+def test_the_bar_across_of_simbody_is_four_weights() -> None:
+    """Half an ellipsoid of 1 kg with a bar of 2 kg at 45 degrees (Simbody 3.7, RattlebackUsingEllipsoid)."""
+    a, c, length, width, thick, depth = 0.25, 1 / 12, 0.5, 0.05, 0.02, 0.02 / 2.1
+    corners = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) * [length, width, thick] / np.sqrt(12)
+    turn = np.array([[1, -1, 0], [1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
+    weights = [{"mass": 0.5, "at": at} for at in (corners @ turn.T + [0, 0, depth]).tolist()]
+    body = {"solid": "half_ellipsoid", "length": 2 * a, "width": 2 * c, "height": c, "mass": 1, "weights": weights}
+    bar = turn @ (2 / 12 * np.diag([width**2 + thick**2, length**2 + thick**2, length**2 + width**2])) @ turn.T
+    offset = (3 / 8 * c + 2 * depth) / 3
+    half = np.diag([2 * c * c, a * a + c * c, a * a + c * c]) / 5 - np.diag([1, 1, 0]) * (3 / 8 * c) ** 2
+    apart = ((3 / 8 * c - offset) ** 2 + 2 * (depth - offset) ** 2) * np.diag([1, 1, 0])
+    inertia, found = half + bar + apart, columns(body)
+    assert (found["mass"], found["offset"]) == pytest.approx((3, offset), rel=1e-12)
+    for name, at in {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1)}.items():
+        assert found[name] == pytest.approx(inertia[at], rel=1e-12), name
+
+
+def test_weights_of_equal_depth_leave_a_body_with_all_that_upright_spin_offers() -> None:
+    """Rounding makes no third product of inertia, with which there would be no linear theory."""
+    pairs = [{"mass": 0.0037, "at": [s * x, s * 0.013, -0.0021]} for x in (0.041, 0.017) for s in (1, -1)]
+    config = load_config({"body": {"solid": "half_ellipsoid", **SIZES, "weights": pairs}, **REST})
+    assert config.equations.name == "slip+coulomb+sigma+offset+gravity"
+    assert load_config(config.document()) == config
+
+
 WRONG = {
     "solid: sphere": (
         "body.solid",
@@ -107,7 +185,16 @@ WRONG = {
     "delta: 0.03": ("body.delta", "does not belong to this solid"),
     "density: 1 g/cm3": ("body.mass", "cannot be combined with density"),
     "surface: paraboloid": ("body.surface", "cannot be combined with a solid"),
-    "solid: {volume: 1e-5}": ("body.solid.a", "must be a finite number > 0"),
+    "solid: {volume: 1e-5}": ("body.solid", "or the numbers that `sweep body --stl` prints, not {'volume': 1e-05}"),
+    "weights: 5 g": ("body.weights", "must be a list of weights, each a mass and a place such as {mass: 5 g, at: [4"),
+    "weights: [{mass: 5 g}]": ("body.weights[0]", "must be a mass and a place"),
+    "weights: [{mass: 5 s, at: [1 cm, 0, 0]}]": ("body.weights[0].mass", "its unit must be kg"),
+    "weights: [{mass: 5 g, at: [1 cm, 0]}]": ("body.weights[0].at", "must be three lengths"),
+    "weights: [{mass: 5 g, at: [1 cm, 0, no]}]": ("body.weights[0].at[2]", "must be a finite number, not 'no'"),
+    "weights: [{mass: 5 g, at: [1 cm, 0, 0]}]": (
+        "body.weights",
+        "centre of mass at 0.01 m along a and 0 m along",
+    ),
 }
 
 
@@ -133,5 +220,5 @@ def test_sizes_need_a_solid_and_si() -> None:
         InputError, match=r"body.length: is the size of a solid; add solid: half_ellipsoid or ellipsoid"
     ):
         load_config({"body": body, **REST})
-    with pytest.raises(InputError, match="units: sizes of a solid are in SI; set units: SI"):
+    with pytest.raises(InputError, match="units: solids and weights are in SI; set units: SI"):
         load_config({**toy(), "units": "paper"})

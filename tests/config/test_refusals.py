@@ -38,7 +38,7 @@ BOWL = ("{a: 0.2", "{surface: paraboloid, a: 0.01")
 # (configuration, line of the fault, path, part of what is said)
 BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "colour: 3\n", 6, "colour", "unknown key; the keys here are name, model,"),
-    (small("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); the keys here are surface, solid, a, b, c, delta"),
+    (small("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); the keys here are surface, solid, weights, a, b, c, delta"),
     ("mu: 60\n", 1, "mu", "unknown key (did you mean friction.mu?); the keys here are name"),
     *(
         (small("delta:", f"{key}: 0.1, delta:"), 2, f"body.{key}", "unknown key: the centre of mass lies on the axis through the surface's centre and lowest point, offset below that centre; no model")

@@ -1,4 +1,4 @@
-"""The parameters of a body that is given by its measured sizes.
+"""The parameters of a body that is given by its measured sizes, and by weights on it.
 
 The solids are a homogeneous ellipsoid, the lower half of one, flat on top, and any other whose mass properties are
 known.  About the ellipsoid's centre and with the semi-axes A, B and C, both ellipsoids have the matrix of inertia
@@ -9,12 +9,14 @@ below it (E. W. Weisstein, "Ellipsoid" and "Hemisphere", mathworld.wolfram.com).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sweep.models.model import Array, Columns
+
+_ROUNDING = 1e-12
 
 _MASS = ("mass", "density")
 
@@ -77,37 +79,29 @@ class Ellipsoid(Solid):
         }  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Shape(Solid):
-    """A homogeneous solid of any shape: its volume, its surface and its inertia per mass, in SI."""
+    """A homogeneous solid of any shape: its volume, its surface and its matrix of inertia per mass."""
 
-    volume: float
-    a: float
-    b: float
-    c: float
-    offset: float
-    Jxx: float
-    Jyy: float
-    Jzz: float
-    Jxy: float = 0.0
-    Jxz: float = 0.0
-    Jyz: float = 0.0
+    numbers: tuple[float, ...]
+    """The values of `names`, in SI."""
+
+    names = ("volume", "a", "b", "c", "offset", "Jxx", "Jyy", "Jzz", "Jxy", "Jxz", "Jyz")
 
     @property
     def spec(self) -> dict[str, float]:
         """Return the value of `solid` in a configuration."""
-        return {name: value for name, value in asdict(self).items() if value or name == "offset"}
+        return dict(zip(self.names, self.numbers, strict=True))
 
     @property
     def skew(self) -> bool:
-        return bool(self.Jxz or self.Jyz)
+        return any(self.numbers[-2:])
 
     def body(self, given: Columns) -> dict[str, Array]:
         """Return the parameters of the models' body, as `Ellipsoid.body` does."""
-        mass = _mass(given, self.volume)
-        one = np.ones_like(mass)
-        surface = {name: one * getattr(self, name) for name in ("a", "b", "c", "offset")}
-        moments = {f"I{name[1:]}": mass * value for name, value in asdict(self).items() if name[0] == "J"}
+        mass = _mass(given, self.numbers[0])
+        surface = {name: np.full_like(mass, self.spec[name]) for name in ("a", "b", "c", "offset")}
+        moments = {name.replace("J", "I"): mass * value for name, value in self.spec.items() if name[0] == "J"}
         return {**surface, "mass": mass, **moments}
 
 
@@ -123,26 +117,63 @@ class Assembly:
     """What the body of a configuration is made of: from its parameters those of the models' body follow."""
 
     solid: Ellipsoid | Shape | None = None
+    weights: tuple[tuple[float, ...], ...] = ()
+    """Point masses in SI: mass, and place along the axes of `a`, of `b` and down, from where `offset` is zero."""
 
     @classmethod
     def of(cls, spec: Mapping[str, Any]) -> Assembly:
         """Return the assembly that has this `spec`."""
         solid = spec.get("solid")
-        return cls(Shape(**solid) if isinstance(solid, Mapping) else solid and SOLIDS[solid])
+        known = Shape(tuple(solid.values())) if isinstance(solid, Mapping) else solid and SOLIDS[solid]
+        return cls(known, tuple((each["mass"], *each["at"]) for each in spec.get("weights", ())))
 
     @property
     def spec(self) -> dict[str, Any]:
         """Return the keys of the section `body` that describe it; none for a body given by its parameters alone."""
-        return {"solid": self.solid.spec} if self.solid else {}
+        weights = [{"mass": mass, "at": at} for mass, *at in self.weights]
+        return ({"solid": self.solid.spec} if self.solid else {}) | ({"weights": weights} if weights else {})
 
     @property
     def named(self) -> tuple[str, ...]:
         """The parameters that follow and that, where the configuration gives them, choose a variant of the model."""
-        return ("offset", *(("Ixz", "Iyz") if self.solid.skew else ())) if self.solid else ()
+        skew = (self.solid and self.solid.skew) or self._second[2, :2].any()
+        return (*(("offset",) if self != NOTHING else ()), *(("Ixz", "Iyz") if skew else ()))
+
+    @property
+    def sideways(self) -> Array:
+        """Return the weights' centre of mass along the axes of `a` and `b`, shape (2,)."""
+        masses, at = self._weights
+        found = np.average(at[:, :2], axis=0, weights=masses)
+        return np.where(np.abs(found) > _ROUNDING * np.abs(at).max(), found, 0.0)
+
+    @property
+    def _weights(self) -> tuple[Array, Array]:
+        """Return masses and places of the weights, shapes (weights,) and (weights, 3)."""
+        rows = np.reshape(self.weights, (-1, 4))
+        return rows[:, 0], rows[:, 1:]
+
+    @property
+    def _second(self) -> Array:
+        """Return the second moments of the weights, shape (3, 3)."""
+        masses, at = self._weights
+        found = at.T * masses @ at
+        return np.where(np.abs(found) > _ROUNDING * np.trace(found), found, 0.0)
 
     def body(self, given: Columns) -> dict[str, Array]:
         """Return the `given` parameters and those that follow, which replace given ones, each of shape (cells,)."""
-        return {**given, **(self.solid.body(given) if self.solid else {})}
+        found = {**given, **(self.solid.body(given) if self.solid else {})}
+        return self._weighted(found) if self.weights else found
+
+    def _weighted(self, body: dict[str, Array]) -> dict[str, Array]:
+        """Return a `body` of the models with the weights: by the parallel axis theorem, about the centre of mass."""
+        masses, at = self._weights
+        mass = body["mass"] + masses.sum()
+        offset = (body["mass"] * body["offset"] + masses @ at[:, 2]) / mass
+        upright = body["mass"] * (body["offset"] - offset) ** 2 + masses @ (at[:, 2:] - offset) ** 2
+        (xx, xy, xz), (_, yy, yz), _ = self._second
+        more = {"Ixx": yy + upright, "Iyy": xx + upright, "Izz": xx + yy, "Ixy": -xy}
+        more |= {"Ixz": -xz, "Iyz": -yz} if xz or yz else {}
+        return {**body, "mass": mass, "offset": offset, **{name: body.get(name, 0 * mass) + i for name, i in more.items()}}
 
 
 NOTHING = Assembly()
