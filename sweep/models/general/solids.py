@@ -173,7 +173,8 @@ class Assembly:
         (xx, xy, xz), (_, yy, yz), _ = self._second
         more = {"Ixx": yy + upright, "Iyy": xx + upright, "Izz": xx + yy, "Ixy": -xy}
         more |= {"Ixz": -xz, "Iyz": -yz} if xz or yz else {}
-        return {**body, "mass": mass, "offset": offset, **{name: body.get(name, 0 * mass) + i for name, i in more.items()}}
+        inertia = {name: body.get(name, 0 * mass) + each for name, each in more.items()}
+        return {**body, "mass": mass, "offset": offset, **inertia}
 
 
 NOTHING = Assembly()
