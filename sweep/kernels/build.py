@@ -50,7 +50,7 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
     KERNEL: lambda kernel: (kernel.advancing,),
     BEGINNING: lambda kernel: kernel.stepper.prepared_by(kernel.model),
     PATH: lambda kernel: (compiled_path(kernel.model),) if kernel.model.path else (),
-    FAILING: lambda kernel: (compiled_approach(kernel.model),),
+    FAILING: lambda kernel: (compiled_approach(kernel.full),),
     EXCHANGE: lambda kernel: (
         (compiled_exchange(form_of(kernel.model).full),) if Offer.ENDING in kernel.model.offers else ()
     ),

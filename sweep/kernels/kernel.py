@@ -157,6 +157,7 @@ class Kernel:
 
     Attributes
     ----------
+    full, model : the model in its own variables, and in those in which the method steps
     measure : the specs of the `kinds` of what is measured or found, of which the `measurements` are part of the kernel
     work, ripple : whether a measurement needs the work of friction, or the ripple-free spin, in each step
     constants : names of the quantities that hold the constants of the model
@@ -164,7 +165,7 @@ class Kernel:
     """
 
     def __init__(self, stepper: Stepper, model: Model, kinds: Sequence[Kind], tolerance: float) -> None:
-        self.stepper, self.model, self.kinds = stepper, stepper.steps_in(model), tuple(kinds)
+        self.stepper, self.full, self.model, self.kinds = stepper, model, stepper.steps_in(model), tuple(kinds)
         self.measurements = tuple(each for each in kinds if isinstance(each, Measurement))
         self.tolerance, self.method, self.measure = tolerance, stepper.name, tuple(each.spec for each in kinds)
         self.work, self.ripple = (any(getattr(each, name) for each in self.measurements) for name in ("work", "ripple"))

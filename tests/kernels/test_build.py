@@ -20,7 +20,8 @@ from support.runs import run_cells
 import sweep
 from sweep.jit import Cached, showing
 from sweep.kernels import build as builder
-from sweep.kernels.build import build
+from sweep.kernels.build import FAILING, build, missing
+from sweep.kernels.methods import METHODS
 from sweep.kernels.samples import sampled
 from sweep.kernels.status import LIFT_OFF
 from sweep.models import MODELS
@@ -78,6 +79,14 @@ def test_what_only_failures_need_is_compiled_when_one_is_met(started: list[tuple
     assert piece not in started
     assert run_cells([ENDS[LIFT_OFF]], t_end=10.0).status == LIFT_OFF
     assert piece in started
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_was_compiled_is_found(method: str) -> None:
+    """Also what a method needs of the model in its own variables."""
+    ours = kernel(method)
+    build([ours], FAILING)
+    assert missing([ours], FAILING) == []
 
 
 @pytest.mark.usefixtures("started")
