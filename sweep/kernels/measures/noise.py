@@ -27,7 +27,7 @@ from sweep.models.general import starts
 from sweep.models.general.reversal_time import energies
 from sweep.models.model import Array, Columns, Model, Offer, stack
 from sweep.models.stiff.slip import form_of
-from sweep.models.theory import linear, modes
+from sweep.models.theory import linear
 
 # Ratio of amplitudes below which a mode counts as round-off of the other.
 DEPTH = 1e-14
@@ -130,7 +130,7 @@ def growth_coefficients(model: Model, columns: Columns) -> Array:
     names = [name for name in columns if name not in _STARTS]
     bodies, which = np.unique(stack((*(columns[name] for name in names), reach)), axis=1, return_inverse=True)
     constants = full.constants.of(dict(zip(names, np.tile(bodies, len(linear.NODES)), strict=False)))
-    rates = modes.rocking_rates(full, constants, np.outer(linear.NODES, bodies[-1]).ravel())
+    rates = linear.rocking_rates(full, constants, np.outer(linear.NODES, bodies[-1]).ravel())
     fit = linear.through_nodes(rates.reshape(2, len(linear.NODES), -1).swapaxes(0, 1))
     powers = bodies[-1] ** np.arange(len(fit))[:, None, None]
     return np.asarray((fit / powers).swapaxes(0, 1)[:, :, which.reshape(-1)])

@@ -36,7 +36,9 @@ from sweep.models.general.common import VISCOUS, Variant, of_any_body, offers
 from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.laws import Law
 from sweep.models.general.rigid_body import about_centre, contact_on, energy_on, gyroscopic
+from sweep.models.general.upright import characteristic_of
 from sweep.models.model import Array, Columns, Model, Offer
+from sweep.models.symbols import Constants
 from sweep.models.vectors import Vector
 
 STATES = ("u1", "u2", "omega1", "omega2", "omega3", "v1", "v2")
@@ -94,6 +96,10 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         return contact(y[0], y[1], Vector(*y[2:5]), p)[2::2]
 
     seen = variant.inline(record, moving_point, y=len(states))
+    polynomial, scene = characteristic_of(surface, law), Constants(record._fields, variant.known)
+
+    def characteristic(rate, spin, p):
+        return polynomial(rate, spin, scene.of(p))
 
     def observe(y: Array, p) -> dict[str, Array]:
         """Contact point, slip v_p, v̇_p, v̇_0 and normal force.
@@ -115,7 +121,8 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
             "normal_force": R,
         }
 
-    linear = law.linear_to is None
+    offered, linear = offers(variant, dissipates=law.coupled is None), law.linear_to is None
+    plain = not (couples or variant.skew or variant.states)
     steady = holds.isotropic and holds.conservative and holds.steady_upright
     ending = law == VISCOUS and steady and all(each.linear and not each.needs_normal_force for each in couples)
     return Model(
@@ -123,7 +130,7 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         summary="full equations with slip friction (Takano 2011, Ldot … visf)",
         states=states,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
-        offers=offers(variant, dissipates=law.coupled is None)
+        offers=offered
         | ({Offer.REVERSAL_TIME} if law == VISCOUS and holds.isotropic and holds.conservative else set())
         | ({Offer.ENDING} if ending else set())
         # A couple slows the spin of a body that does not rattle; skips do not allow for that.
@@ -133,6 +140,7 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
         fastest_decay=fastest_decay,
         upright=lambda spin: tuple(-spin if name == "omega3" else 0.0 for name in states),
         rhs=rhs,
+        characteristic=characteristic if plain and Offer.LINEAR in offered else None,
         energy=variant.inline(record, energy_on(surface), y=len(states)),
         ripple=ripple.of_velocities(surface, skew=variant.skew),
         observe=observe,

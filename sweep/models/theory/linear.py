@@ -10,7 +10,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sweep.models.model import Array, Columns, Model, stack
+from sweep.models.model import Array, Columns, Model, stack, take
+from sweep.models.theory.polynomials import RATE, Polynomial, values_and_slopes
 
 # Columns of a Jacobian that are computed in one call, times cells: few calls for few cells, and many stay in the cache.
 _TOGETHER = 1024
@@ -38,9 +39,67 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
     return np.moveaxis(np.concatenate(columns, axis=1), -1, 0)
 
 
+def characteristic(model: Model, constants, spin: Array) -> Array:
+    """Coefficients of the characteristic polynomial in λ, lowest power first, of a model that has one, (7, cells)."""
+    assert model.characteristic
+    return np.asarray(model.characteristic(RATE, spin, constants).coefficients[:, 0])
+
+
+def rates(model: Model, constants, spin: Array) -> Array:
+    """Find the eigenvalues λ of the rattle, in sqrt(g/c), shape (cells, m), where m is the number of states without the
+    spin.
+
+    Of a model without a characteristic polynomial, and where the roots of that cannot be found with certainty, they are
+    those of the Jacobian.
+    """
+    if not model.characteristic:
+        return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)))
+    found, sound = _roots(characteristic(model, constants, spin))
+    others = np.flatnonzero(~sound)
+    if len(others):
+        found[others] = np.linalg.eigvals(jacobian(model, take(constants, others), spin[others]))
+    return found
+
+
+# Newton's steps to the frequencies, the least share by which they are taken to differ at first, and the error relative
+# to each coefficient with which the roots have to reproduce the polynomial.
+_STEPS, _APART, _EXACT = 6, 0.02, 1e-12
+
+
+@np.errstate(all="ignore")
+def _roots(polynomial: Array) -> tuple[Array, Array]:
+    """Return the roots of real polynomials of sixth degree, shape (cells, 6), and whether they are right.
+
+    The first two have positive imaginary parts.  They begin at the frequencies without slip, as where friction is
+    strong, and repel each other and the conjugate ones (Aberth's method).  The other two are what is left.
+    """
+    c = polynomial / polynomial[6]
+    half = c[2] / (2 * c[4])
+    split = np.sqrt(np.maximum(half**2 - c[0] / c[4], (_APART * half) ** 2))
+    z = 1j * np.sqrt(np.stack([half - split, half + split]))
+    for _ in range(_STEPS):
+        value, slope = values_and_slopes(c[:, None], z)
+        step, other = value / slope, z[::-1]
+        z = z - step / (1 - step * (1 / (z - other) + 1 / (z - other.conj()) - 0.5j / z.imag))
+    p, q = -2 * z.real, z.real**2 + z.imag**2  # of λ² + p λ + q
+    p, q = (*p, c[5] - p.sum(axis=0)), (*q, c[0] / (q[0] * q[1]))
+    root = np.sqrt((p[2] ** 2 / 4 - q[2]).astype(complex))
+    one, two, three = (Polynomial(np.stack([q[i], p[i], np.ones_like(half)])[:, None]) for i in range(3))
+    again = (one * two * three).coefficients[1:5, 0]
+    found = np.stack([*z, *z.conj(), -p[2] / 2 + root, -p[2] / 2 - root], axis=1)
+    return found, np.asarray((np.abs(again / c[1:5] - 1) < _EXACT).all(axis=0))
+
+
 def growth_rate(model: Model, constants, spin: Array) -> Array:
     """Largest real part of the rattle's eigenvalues, in sqrt(g/c), shape (cells,): positive where the rattle grows."""
-    return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)).real.max(axis=-1))
+    return np.asarray(rates(model, constants, spin).real.max(axis=-1))
+
+
+def rocking_rates(model: Model, constants, spin: Array) -> Array:
+    """Re λ of both rocking modes, the slower first, in sqrt(g/c), shape (2, cells)."""
+    values = rates(model, constants, spin)
+    order = np.argsort(-values.imag, axis=1)[:, 1::-1]
+    return np.take_along_axis(values.real, order, axis=1).T
 
 
 def fastest_motion(model: Model, columns: Columns) -> Array:
@@ -54,7 +113,7 @@ def fastest_motion(model: Model, columns: Columns) -> Array:
     reach = fastest_spin(model, columns)
     values = np.concatenate(
         [
-            np.linalg.eigvals(jacobian(model, model.constants.of(extreme), spin))
+            rates(model, model.constants.of(extreme), spin)
             for extreme in model.extremes(columns)
             for spin in (reach, -reach)
         ],

@@ -120,13 +120,6 @@ def modes_at(model: Model, constants: Any, spin: Array) -> Modes:
     return Modes(rates, vectors.astype(complex), upright, equations, constants)
 
 
-def rocking_rates(model: Model, constants: Any, spin: Array) -> Array:
-    """Re λ of both rocking modes, the slower first, in sqrt(g/c), shape (2, cells)."""
-    values = np.linalg.eigvals(jacobian(model, constants, spin))
-    order = np.argsort(-values.imag, axis=1)[:, 1::-1]
-    return np.take_along_axis(values.real, order, axis=1).T
-
-
 def resting_spin(model: Model, constants: Any, states: Array) -> Array:
     """Return the spin that remains when the rattle has decayed at its present rates, in sqrt(g/c), shape (cells,).
 

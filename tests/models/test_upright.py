@@ -1,0 +1,119 @@
+"""The characteristic polynomial of a rattle, its roots, and the stable ranges that follow, against its Jacobian."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import wide_bodies
+from support.physics import KANE_LEVINSON
+
+from sweep.models import MODELS, find
+from sweep.models.model import Model
+from sweep.models.theory import linear, stability
+from sweep.models.theory.polynomials import RATE, SPIN, Polynomial, real_roots
+
+SLIP = MODELS["slip"]
+
+
+def bodies(name: str) -> tuple[Model, dict[str, np.ndarray]]:
+    wide = wide_bodies(1000)
+    given = {
+        "slip": {},
+        "slip+viscous+offset": {"offset": 0.4 * wide["c"]},
+        "slip+coulomb": {"mu": 0.3 + 0 * wide["c"], "speed": 0.01 + 0 * wide["c"]},
+        "slip+viscous+offset+gravity": {n: v + 0 * wide["c"] for n, v in KANE_LEVINSON.items()},
+    }
+    return find(name), wide | given[name]
+
+
+NAMES = ("slip", "slip+viscous+offset", "slip+coulomb", "slip+viscous+offset+gravity")
+
+
+def spins(model: Model, body: dict[str, np.ndarray]) -> list[np.ndarray]:
+    return [share * model.spin_unit(body) for share in (0.0, 0.05, -0.3, 2.0)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_polynomial_is_the_determinant(name: str) -> None:
+    model, body = bodies(name)
+    constants, random = model.constants.of(body), np.random.default_rng(2)
+    for spin in spins(model, body):
+        rate = model.spin_unit(body) * (random.normal(size=1000) + 1j * random.normal(size=1000))
+        matrix = rate[:, None, None] * np.eye(6) - linear.jacobian(model, constants, spin)
+        determinant = constants.J11 * constants.J22 * np.linalg.det(matrix)
+        assert model.characteristic
+        np.testing.assert_allclose(model.characteristic(rate, spin, constants), determinant, rtol=1e-10)
+        coefficients = linear.characteristic(model, constants, spin)
+        np.testing.assert_allclose((coefficients * rate ** np.arange(7)[:, None]).sum(axis=0), determinant, rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_rates_are_the_eigenvalues(name: str) -> None:
+    model, body = bodies(name)
+    constants = model.constants.of(body)
+    for spin in spins(model, body):
+        found = np.sort_complex(linear.rates(model, constants, spin))
+        expected = np.sort_complex(np.linalg.eigvals(linear.jacobian(model, constants, spin)))
+        largest = np.abs(expected).max(axis=1, keepdims=True)
+        # Two equal eigenvalues of a matrix are off by the root of its rounding.
+        np.testing.assert_allclose(found / largest, expected / largest, atol=1e-7)
+        assert np.quantile(np.abs(found - expected) / largest, 0.99) < 1e-12
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_ranges_are_those_of_the_matrices(name: str) -> None:
+    """These have fewer digits at fast spins, and where two modes hardly differ (`sweep.models.theory.stability`)."""
+    model, body = bodies(name)
+    found = np.stack(stability.stable_ranges(model, body))
+    expected = np.stack(stability.stable_ranges(replace(model, characteristic=None), body))
+    np.testing.assert_allclose(found, expected, rtol=1e-2)
+    slow = np.isfinite(expected) & (np.abs(expected) < 0.05 * model.spin_unit(body))
+    assert slow.sum() > 500
+    np.testing.assert_allclose(found[slow], expected[slow], rtol=1e-6)
+    assert np.quantile(np.abs(found[slow] / expected[slow] - 1), 0.98) < 1e-10
+
+
+def test_a_rattle_decays_by_the_signs_of_all_growth_rates() -> None:
+    body = wide_bodies(1000)
+    constants = SLIP.constants.of(body)
+    for spin in spins(SLIP, body):
+        growth = np.linalg.eigvals(linear.jacobian(SLIP, constants, spin)).real.max(axis=1)
+        clear = np.abs(growth) > 1e-9
+        assert clear.sum() > 800
+        np.testing.assert_array_equal(stability._decays(SLIP, constants, spin)[clear], growth[clear] < 0)
+
+
+def test_polynomials_add_and_multiply_like_their_values() -> None:
+    two = Polynomial(np.array([[[1.0, 2.0], [0.5, 0.0]]]))
+    made = (3.0 - RATE * RATE) * (two + SPIN) - np.array([2.0, 7.0]) * RATE * (SPIN - 1.0)
+    for rate, spin in ((0.0, 0.3), (1.5, -2.0)):
+        value = sum(
+            each * rate**i * spin**j for i, row in enumerate(made.coefficients) for j, each in enumerate(row)
+        )  # fmt: skip
+        of_two = np.array([1.0 + 0.5 * spin, 2.0])
+        expected = (3 - rate**2) * (of_two + spin) - np.array([2.0, 7.0]) * rate * (spin - 1)
+        np.testing.assert_allclose(value, expected)
+
+
+def test_all_real_roots_are_found() -> None:
+    """Of polynomials that are made of their roots: far apart, close together, beyond the limit, and complex."""
+    random, cells = np.random.default_rng(4), 300
+    real = np.exp(random.uniform(np.log(1e-5), np.log(5.0), (4, cells))) * random.choice([1.0, 1.0, -1.0], (4, cells))
+    real[1, ::3] = real[0, ::3] * 1.001
+    complex_ = random.uniform(-1, 2, (3, cells)), random.uniform(0.01, 1, (3, cells))
+    product = np.ones((1, cells))
+    for factor in [*([-r, np.ones(cells)] for r in real),
+                   *([x**2 + y**2, -2 * x, np.ones(cells)] for x, y in zip(*complex_, strict=True))]:  # fmt: skip
+        product = sum(np.pad(product * c, ((k, len(factor) - 1 - k), (0, 0))) for k, c in enumerate(factor))  # type: ignore[assignment]
+    limit = random.uniform(0.5, 2.0, cells)
+    which, found = real_roots(product, limit)
+    for cell in range(cells):
+        wanted = real[:, cell]
+        expected = np.sort(wanted[(wanted > 0) & (wanted < limit[cell])])
+        np.testing.assert_allclose(np.sort(found[which == cell]), expected, rtol=1e-7)
+
+
+def test_a_polynomial_without_such_roots_has_none() -> None:
+    for coefficients in ([1.0, 0.0, 1.0], [1.0, -2.0, 1.0], [0.0, 0.0], [1.0, -0.1], [5.0, 0.0]):
+        _, found = real_roots(np.array(coefficients)[:, None], np.ones(1))
+        assert not len(found)
