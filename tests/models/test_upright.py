@@ -84,6 +84,12 @@ def test_at_the_ends_of_the_ranges_nearly_round_bodies_neither_grow_nor_decay() 
         np.testing.assert_allclose(growth / end[known], 0, atol=2e-8)
 
 
+def test_no_bodies_have_no_rates() -> None:
+    none = {name: values[:0] for name, values in wide_bodies(1).items()}
+    assert linear.rates(SLIP, SLIP.constants.of(none), none["n0"]).shape == (0, 6)
+    assert np.shape(stability.stable_ranges(SLIP, none)) == (7, 0)
+
+
 def test_a_rattle_decays_by_the_signs_of_all_growth_rates() -> None:
     body = wide_bodies(1000)
     constants = SLIP.constants.of(body)

@@ -30,7 +30,8 @@ class Polynomial:
 
     def __add__(self, other: Any) -> Polynomial:
         one, two = self.coefficients, _coefficients(other)
-        total = np.zeros(np.maximum(one.shape, two.shape))
+        size = np.maximum(one.shape[:2], two.shape[:2])
+        total = np.zeros((*size, *np.broadcast_shapes(one.shape[2:], two.shape[2:])))
         for each in (one, two):
             total[: each.shape[0], : each.shape[1]] += each
         return Polynomial(total)
@@ -38,7 +39,7 @@ class Polynomial:
     def __mul__(self, other: Any) -> Polynomial:
         one, two = sorted((self.coefficients, _coefficients(other)), key=lambda each: each.shape[0] * each.shape[1])
         size = [a + b - 1 for a, b in zip(one.shape[:2], two.shape[:2], strict=True)]
-        product = np.zeros((*size, max(one.shape[2], two.shape[2])))
+        product = np.zeros((*size, *np.broadcast_shapes(one.shape[2:], two.shape[2:])))
         for i, j in np.argwhere(one.any(axis=2)):
             product[i : i + two.shape[0], j : j + two.shape[1]] += one[i, j] * two
         return Polynomial(product)
