@@ -5,8 +5,8 @@ the imaginary axis as a pair, or one crosses it at zero.  All the spins where ei
 in n, so no range is missed, however narrow it is.
 
 Where the characteristic polynomial c0 + c1 λ + … + c6 λ⁶ of J is known as a polynomial in n too, they are the roots of
-c0 and of a resultant.  By arithmetic of 60 digits all of 201 ends of ranges of random bodies were right to 1e-9, and all
-but six that the other way gives.
+c0 and of a resultant.  By arithmetic of 60 digits, all of 201 ends of ranges of random bodies were right to 1e-9, and
+all but six that the other way gives.
 
 The Jacobian of any other model has to be quadratic in n, as rigid bodies have gyroscopic terms linear in their spin and
 centrifugal ones quadratic in it.  Then J itself, or its second additive compound, whose eigenvalues are the sums of two
