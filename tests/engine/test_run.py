@@ -1,6 +1,7 @@
 """Whole runs: from a configuration to numbers, however they are cut into tiles, chunks and sittings."""
 
 import gc
+import time
 import weakref
 from pathlib import Path
 from typing import Any
@@ -47,7 +48,7 @@ def test_python_writes_nothing_by_itself(write: Write, tmp_path: Path, monkeypat
 
 @pytest.mark.usefixtures("short_chunks")
 def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.Dataset, counted: list[float]) -> None:
-    out = tmp_path / "out"
+    out, began = tmp_path / "out", time.perf_counter()
     sweep.run(write())
     needed = sum(counted)
     counted.clear()
@@ -55,6 +56,7 @@ def test_resumes_and_recomputes_nothing(write: Write, tmp_path: Path, small: xr.
     assert interruptions > 2
     assert last.notes[0].startswith("resuming an earlier run: ")
     assert sum(counted) == needed
+    assert 0 < dataset.attrs["wall_time"] < time.perf_counter() - began
     same_numbers(dataset, small)
     assert {path.name for path in out.iterdir()} == {"small.nc", "small.png"}
 

@@ -13,7 +13,7 @@ from support import ROOT
 import sweep
 from sweep.engine.reporter import Progress
 from sweep.explorer import runner
-from sweep.explorer.runner import COMPILING, Curve, Job, Runner
+from sweep.explorer.runner import COMPILING, Curve, Drawn, Job, Runner
 from sweep.explorer.setup import Setup, usable
 from sweep.explorer.slices import Source
 from sweep.explorer.state import Cell
@@ -102,6 +102,13 @@ def test_short_stretches_go_first(setup: Setup) -> None:
     for job in jobs:
         job.wait()
     assert news.index((70.0, False)) < news.index((60.0, True))
+
+
+def test_the_first_of_cells_that_are_shown_at_once_is_active(monkeypatch: pytest.MonkeyPatch, setup: Setup) -> None:
+    monkeypatch.setattr(Runner, "submit", lambda *_: None)
+    drawn = Drawn([], Runner(setup), lambda _: None)
+    drawn.show([{"mu": 60.0}, {"mu": 70.0}])
+    assert drawn.active == 0
 
 
 def test_what_cannot_be_run_is_reported(setup: Setup) -> None:
