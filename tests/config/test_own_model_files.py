@@ -156,7 +156,6 @@ def test_parameters_are_known_to_settings_messages_and_tables(folder: Path) -> N
         ("body.a", 3.0, "body.a: unknown key; the keys here are damping"),
         ("units", "SI", "units: the file of the model gives the units; leave them out"),
         ("integrator.method", "adams", "cannot run the pendulum model; choose dopri5"),
-        ("measure", ["energy_error"], "energy_error cannot be measured on the pendulum model; choose from reversals"),
     ):
         with pytest.raises(InputError, match=message):
             load_config(file, {key: value})

@@ -26,9 +26,9 @@ def averaged(one: xr.Dataset) -> np.ndarray:
     return np.convolve(spin[np.isfinite(spin)], np.full(width, 1 / width), "valid")
 
 
-@pytest.mark.parametrize(("mu", "t_end"), [(66.0, 5e4), (71.0, 2e4), (84.0, 2e4)])
+@pytest.mark.parametrize(("mu", "t_end"), [(71.0, 2e4), (84.0, 2e4)])
 def test_margins_are_extremes_of_the_averaged_spin(mu: float, t_end: float) -> None:
-    """The sweep leaves the first two before their nearest approach; the trajectories go on."""
+    """The sweep leaves the first before its nearest approach; the trajectory goes on."""
     swept = sweep.run(SCENE, mu=mu)
     one = sweep.trajectory(SCENE, at={"mu": mu}, t_end=t_end, every=2.0, estimate_errors=False)
     spin = averaged(one)

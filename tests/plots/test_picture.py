@@ -351,7 +351,6 @@ def test_axes_in_any_order_of_values() -> None:
         ({"at": ["n0"]}, "at: must be values by axis"),
         ({"width": 3}, "width: 3; give a length between 50 and 1000 mm"),
         ({"vmin": 0, "variable": "ratio", "ax": Figure().subplots()}, "vmin: 0; give a number above zero for a ratio"),
-        ({"variable": "q"}, "variable: there is no variable q; choose reversals"),
         ({"output": "x.jpg"}, "output: x.jpg: unknown format; write a png, pdf or svg"),
     ],
 )
