@@ -122,7 +122,8 @@ def counts(setup: Setup, source: Source, state: State, job: Job | None = None) -
     for spread in _SPREADS:
         some = place[tuple(slice(None, None, spread) for _ in shape)].ravel()
         some = some[possible[some] & ~simulated[some]]
-        for cells in np.split(some, range(_TOGETHER, len(some), _TOGETHER)):
+        for begin in range(0, len(some), _TOGETHER):
+            cells = some[begin : begin + _TOGETHER]
             theirs = take(given, cells)
             with all_threads():
                 result = run(_of_cells(setup.config, theirs, tuple(axes)), reporter=job)

@@ -45,6 +45,20 @@ def test_counts_are_estimated_and_then_simulated(drag: dict[str, float]) -> None
     assert last.dataset[COUNT].attrs["long_name"] == "spin reversals, simulated, δ = 0.05 rad"
 
 
+def test_a_size_of_a_solid_with_weights_can_be_changed() -> None:
+    weights = [{"mass": "5 g", "at": at} for at in (["4 cm", "1 cm", "-2 mm"], ["-4 cm", "-1 cm", "-2 mm"])]
+    body = {"solid": "half_ellipsoid", "length": "12 cm", "width": ["36 mm", "40 mm"], "height": "16 mm",
+            "mass": "52 g", "weights": weights}  # fmt: skip
+    scene = {"units": "SI", "body": body, "friction": {"mu": 100}, "measure": ["reversals"],
+             "start": {"n0": [3, 5], "x0": "1 mm", "y0": "0.3 mm"}, "integrator": {"t_end": 20}}  # fmt: skip
+    source = Source(sweep.run(scene))
+    setup = Setup(source)
+    assert {"length", "height", "mass"} <= bodies.can_change(setup, source).keys()
+    *_, last = bodies.counts(setup, source, replace(state.first(source), changed={"mass": 0.1}))
+    expected = sweep.run(scene | {"body": body | {"mass": 0.1}})["reversals"]
+    np.testing.assert_array_equal(last.dataset[COUNT], expected.transpose(*last.dataset[COUNT].dims))
+
+
 def test_a_value_stands_for_those_beside_it_on_a_long_axis() -> None:
     source, setup = a_source(friction={"mu": {"start": 20, "stop": 120, "num": 130}}, body={"b": 3})
     shown = replace(state.first(source), changed={"a": 11.0})
