@@ -17,6 +17,10 @@ from sweep.config.schema import Integrator
 from sweep.config.values import Values
 from sweep.faults import InputError, Path
 from sweep.grid import CASE, SAMPLE, Grid
+from sweep.kernels import measures
+from sweep.kernels.measures.margin import Margin
+from sweep.kernels.method import COARSEST
+from sweep.kernels.methods import AUTO
 from sweep.models import TIERS
 from sweep.models.general import laws
 from sweep.models.general.common import EXTRAS
@@ -144,6 +148,18 @@ class Config:
     def simulated(self) -> bool:
         """Return whether the model is simulated; formulas and the slow equations are evaluated."""
         return isinstance(self.tier, Model)
+
+    @property
+    def by_count(self) -> bool:
+        """Whether each cell is integrated only as exactly as its count needs (`tolerance: auto`)."""
+        how, kinds = self.integrator, measures.chosen(self.measure)
+        margins = any(kind.name == Margin.name for kind in kinds) and not any(kind.exact for kind in kinds)
+        return margins and how.tolerance == AUTO and how.step == AUTO and how.estimate_errors and self.repeats
+
+    @property
+    def tolerance(self) -> float:
+        """The tolerance with which cells begin, and with which they end unless a count needs a finer one."""
+        return COARSEST if self.by_count else self.integrator.tolerance_number
 
     @property
     def own_law(self) -> laws.Law | None:

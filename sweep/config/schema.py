@@ -96,10 +96,13 @@ class Integrator(Strict):
     step: Annotated[
         Annotated[float, Field(gt=0)] | Literal["auto"], BeforeValidator(_in_si), Allowed("auto or a finite number > 0")
     ] = Field(default="auto", description="fixed step in sqrt(c/g) or, with `units: SI`, in s; or `auto`")
-    tolerance: float = Field(
-        default=TOLERANCE, ge=1e-14, lt=1,
-        description="permitted error in spin at t = 400, in sqrt(g/c), from which automatic steps are chosen",
-    )  # fmt: skip
+    tolerance: Annotated[
+        Annotated[float, Field(ge=1e-14, lt=1)] | Literal["auto"], Allowed("auto or a finite number >= 1e-14 and < 1")
+    ] = Field(
+        default="auto",
+        description="permitted error in spin at t = 400, in sqrt(g/c), from which automatic steps are chosen; or "
+        f"`auto`: where counts and their margins are measured, what each count needs to be certain, else {TOLERANCE:g}",
+    )
     estimate_errors: bool = Field(
         default=True,
         description="whether each cell is run a second time, with longer steps, to estimate its error; cells above "
@@ -133,6 +136,11 @@ class Integrator(Strict):
     def settles(self) -> bool:
         """Whether a trajectory ends once spin and count can no longer change."""
         return self.stop_early is not False
+
+    @property
+    def tolerance_number(self) -> float:
+        """The tolerance; where it is `auto`, the one of whatever is not a count."""
+        return TOLERANCE if isinstance(self.tolerance, str) else self.tolerance
 
     @property
     def first_leg(self) -> float | None:

@@ -30,6 +30,8 @@ class Rules:
     """Whether each cell is run a second time, to estimate its error."""
     repeats: bool = False
     """Whether cells above the tolerance are repeated."""
+    by_count: bool = False
+    """Whether a cell is repeated until its count is certain too, with a finer tolerance."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Cells:
     """The longest permitted step, in sqrt(c/g), shape (cells,)."""
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
+    tolerance: Array
+    """The tolerance for which each is integrated, at most that of the rules, shape (cells,)."""
     stable: StableRanges
     """Ranges of spin in which the rattle decays."""
     rows: Array
@@ -90,7 +94,7 @@ class Cells:
         """Return some of these cells, with their own state rows or with others."""
         return replace(
             self, cells=self.cells[which], columns=take(self.columns, which), step=self.step[which],
-            step_rule=self.step_rule[which], stable=take(self.stable, which),
+            step_rule=self.step_rule[which], tolerance=self.tolerance[which], stable=take(self.stable, which),
             rows=self.rows[which] if rows is None else rows,
         )  # fmt: skip
 

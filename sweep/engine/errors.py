@@ -29,14 +29,19 @@ import numpy as np
 from sweep.engine.cells import Cells
 from sweep.engine.plan import TOLERANCE_TIME
 from sweep.grid import Array
-from sweep.kernels.measures.margin import last_arc
+from sweep.kernels.measures.margin import Margin, last_arc, margins
 from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import endings, ends_as_predicted, only
 from sweep.kernels.measures.reversals import Reversals
+from sweep.kernels.status import SETTLED, Doubt
 from sweep.models.slow.estimate import Ending
 
 ROUND_OFF = 1e-13
 """An error in spin that no shorter step reduces, in sqrt(g/c)."""
+
+CLEAR = 10.0
+"""Required ratio of the margin of a count to its estimated error: about one in a hundred estimates is more than ten
+times too small (docs/explanation/accuracy.md)."""
 
 OF_RATTLE = 1 / 20
 """Share of the error of the rattle above which spins are assumed to agree by chance. With a sixtieth, one of 300
@@ -62,10 +67,9 @@ class Errors(NamedTuple):
     """Lower bound on the reported error of the spin; NaN without a second run."""
     reversals: Array
     """Counts of the second runs, with the reversals that are still to come; NaN where there is none."""
-    overshoot: Array
-    """Estimated error of the margin to one reversal fewer; NaN if it is not measured, or without a second run."""
-    nearest_approach: Array
-    """Estimated error of the margin to one reversal more."""
+    of_margins: Array
+    """Ten times the estimated errors of the margins relative to the margins, the larger of both: above 1, another count
+    is possible. NaN if they are not measured, or without a second run."""
     apart: Array
     """Difference of the spins relative to the spins themselves."""
 
@@ -75,11 +79,11 @@ class Errors(NamedTuple):
         return np.asarray(np.fmax(self.spin, self.least))
 
 
-def allowed(part: Cells) -> Array:
-    """Return the permitted error in spin at the ends of the runs, in the model's units, shape (cells,)."""
+def allowed(part: Cells, tolerance: float | Array) -> Array:
+    """Return the error in spin that a tolerance permits at the ends of the runs, in the model's units, (cells,)."""
     unit = part.model.spin_unit(part.columns)
     longer = np.maximum(part.times * unit / TOLERANCE_TIME, 1)
-    return np.asarray(max(part.rules.tolerance, ROUND_OFF) * longer * unit)
+    return np.asarray(np.fmax(tolerance, ROUND_OFF) * longer * unit)
 
 
 def limited_by_round_off(part: Cells) -> Array:
@@ -116,31 +120,57 @@ def compare(first: Cells, second: Cells, left: Ending) -> Errors:
     apart = np.divide(difference, size, out=np.zeros_like(size), where=~second.failed & (size > 0))
     spin = np.where(second.failed, np.inf, difference / larger)
     rattle = np.where(second.failed, np.nan, rattle / larger)
-    counts, overshoot, nearest = _of_counts(first, second, left, larger)
-    return Errors(spin, rattle, _least(first, rattle), counts, overshoot, nearest, apart)
+    counts, of_margins = _of_counts(first, second, left, larger)
+    return Errors(spin, rattle, _least(first, rattle), counts, of_margins, apart)
 
 
-def _of_counts(first: Cells, second: Cells, left: Ending, larger: Array) -> Array:
-    """Return the counts of the second runs and the errors of both margins, shape (3, cells); NaN where unknown.
+def _of_counts(first: Cells, second: Cells, left: Ending, larger: Array) -> tuple[Array, Array]:
+    """Return `reversals` and `of_margins` of `Errors`, each of shape (cells,).
 
-    `larger` is the ratio of the difference of two runs to the error, shape (cells,).
+    `larger` is the ratio of the difference of two runs to the error, shape (cells,). Two runs may agree in one margin
+    by chance, however wrong both are; that they agree in both is less likely. So the larger error counts for both,
+    unless a couple slows the spin, and with it the error of the overshoot.
     """
     if Reversals.name not in first.kernel.measure:
-        return np.full((3, len(larger)), np.nan)
+        return np.full(len(larger), np.nan), np.full(len(larger), np.nan)
     predicted = ends_as_predicted(first.table, left) & ~second.failed
     ours = last_arc(first.table, only(predicted, left))
     theirs = last_arc(second.table, endings(second.table, predicted))
     # Round-off does not shrink with the step.
     larger = np.where(limited_by_round_off(first), np.fmin(larger, 1.0), larger)
-    margins = [np.abs(one - another) / larger for one, another in zip(ours[1:], theirs[1:], strict=True)]
-    return np.where(second.failed, np.nan, [theirs.reversals, *margins])
+    overshoot, nearest = (np.abs(one - another) / larger for one, another in zip(ours[1:], theirs[1:], strict=True))
+    both, more, fewer = np.fmax(overshoot, nearest), *margins(first.table, left)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = (nearest if first.model.slows else both) / more
+        relative = np.where(first.table["reversals"] > 0, np.maximum(relative, both / fewer), relative)
+    count, of_margins = np.where(second.failed, np.nan, [theirs.reversals, CLEAR * relative])
+    return count, of_margins
+
+
+def doubted_counts(cells: Cells, errors: Errors) -> dict[Doubt, Array]:
+    """Return which cells' counts the second runs give reason to doubt, masks of shape (cells,), by the reason."""
+    against, count, sound = {}, cells.recorded(Reversals.name), ~cells.failed
+    if Reversals.name in cells.kernel.measure:
+        against[Doubt.STEP] = sound & (errors.reversals != count)  # a failed second run has the count NaN
+    if Margin.name in cells.kernel.measure:
+        against[Doubt.MARGIN] = (cells.status == SETTLED) & ~(errors.of_margins < 1)
+        against[Doubt.PARITY] = sound & ~_consistent(cells, count)
+    return against
+
+
+def _consistent(cells: Cells, count: Array) -> Array:
+    """Return where the parity of the count matches the signs of the spin at start and end, shape (cells,)."""
+    model, columns = cells.model, cells.columns
+    start, _, _ = model.energy(model.start(columns), model.constants.of(columns))
+    turned = start * cells.kernel.spins(cells.rows)
+    return np.asarray(np.where(count % 2 == 1, turned <= 0, turned >= 0))
 
 
 def _least(part: Cells, rattle: Array) -> Array:
     """Return lower bounds on the errors of the cells of `part`, shape (cells,), given the error of the rattle."""
     share, balance = part.kernel.stepper.least_error, imbalance(part)
     known = np.isfinite(balance + rattle) & (share > 0) & (not part.rules.fixed)
-    expected = np.sqrt(np.where(known, balance, 0.0) * allowed(part))
+    expected = np.sqrt(np.where(known, balance, 0.0) * allowed(part, part.tolerance))
     return np.where(known, share * expected, OF_RATTLE * rattle)
 
 

@@ -17,7 +17,16 @@ import numpy as np
 
 from sweep.engine import failures, over
 from sweep.engine.cells import Cells
-from sweep.engine.errors import OF_RATTLE, Errors, allowed, compare, imbalance, limited_by_round_off, second_steps
+from sweep.engine.errors import (
+    OF_RATTLE,
+    Errors,
+    allowed,
+    compare,
+    doubted_counts,
+    imbalance,
+    limited_by_round_off,
+    second_steps,
+)  # fmt: skip
 from sweep.engine.executor import keep_busy
 from sweep.engine.failures import Met
 from sweep.engine.lives import (
@@ -38,7 +47,8 @@ from sweep.engine.lives import (
 from sweep.grid import Array
 from sweep.kernels.kernel import FAILURE
 from sweep.kernels.layout import Table
-from sweep.kernels.status import DIVERGED, FAILURES, SETTLED
+from sweep.kernels.method import TOLERANCE
+from sweep.kernels.status import DIVERGED, FAILURES, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.model import take
 
 Going = Iterator[tuple[Array, Next]]
@@ -123,7 +133,7 @@ def _judged(lives: Lives, which: Array, met: Met) -> Going:
         note(lives.notes, "met", on, take(met, again))
         lives.notes["halvings"][on] += 1
         lives.notes["step_before"][on], lives.before[on] = now.step[again], now.rows[again]
-        yield on, Repeat(now.step[again] / 2)
+        yield on, Repeat(now.step[again] / 2, now.tolerance[again])
     here = which[~again]
     if rules.fixed:
         back = here[begun[~again]]
@@ -167,23 +177,40 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
     """Is it within its tolerance? The second run gives the error of the first (`sweep.engine.errors`).
 
     A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, until the error is below
-    `AIM` times the tolerance. A cell whose error stays above the tolerance has missed it.
+    `AIM` times the tolerance. A cell whose error stays above the tolerance has missed it. With `tolerance: auto` this
+    tolerance is coarse, and the step is shortened until the count is certain as well.
 
-    After a reversal that grew from round-off the error is unknown: the cell is neither repeated nor said to miss its
-    tolerance.
+    After a reversal that grew from round-off the error is unknown: the cell is not repeated because of it, nor said to
+    miss its tolerance.
     """
     first, second, notes = lives.take(which, lives.aside), lives.take(which), lives.notes
     found = compare(first, second, lives.left(which))
-    known = ~limited_by_round_off(first)
-    shorter, most = _shorter(first, found, notes["repeats"][which], notes["most_error"][which])
-    again = known & np.isfinite(shorter) & first.rules.repeats
+    permitted, known = allowed(first, first.rules.tolerance), ~limited_by_round_off(first)
+    excess = np.where(known, found.spin / (AIM * permitted), 0.0)
+    by_chance = known & (excess <= 1) & (OF_RATTLE * found.rattle > AIM * permitted)
+    if first.rules.by_count:
+        excess = np.fmax(excess, _of_count(first, found))
+    shorter, most = _shorter(first, found, excess, by_chance, notes[which])
+    again = np.isfinite(shorter) & first.rules.repeats
     lives.rows[which] = first.rows
     note(notes, "error", which, found)
-    notes["missed"][which] = ~again & known & (found.reported > allowed(first)) & (not first.rules.fixed)
+    notes["missed"][which] = ~again & known & (found.reported > permitted) & (not first.rules.fixed)
     notes["repeats"][which] += again
-    notes["most_error"][which[again]] = most[again]
-    yield which[again], Repeat(first.step[again] / shorter[again])
+    notes["most_excess"][which[again]] = most[again]
+    finer = shorter**_ORDER if first.rules.by_count else np.ones(len(which))
+    yield which[again], Repeat(first.step[again] / shorter[again], first.tolerance[again] / finer[again])
     yield which[~again], Done()
+
+
+def _of_count(run: Cells, errors: Errors) -> Array:
+    """Return the factor by which errors have to fall for a count to be certain, shape (cells,).
+
+    It is infinite where nothing tells it: another count, or a spin that cannot be predicted beyond the first leg.
+    """
+    against, unpredicted = doubted_counts(run, errors), run.rules.first_leg is not None
+    another = against[Doubt.STEP] | against[Doubt.PARITY] | (unpredicted & (run.status == TIME_LIMIT))
+    factor = np.where(against[Doubt.MARGIN], errors.of_margins / AIM, 0.0)
+    return np.where(another | np.isnan(factor), np.inf, factor)
 
 
 REPEATS = 4
@@ -217,8 +244,8 @@ _TOO_LITTLE = 1.5
 _ORDER = 5
 
 
-def _shorter(run: Cells, errors: Errors, repeats: Array, most: Array) -> tuple[Array, Array]:
-    """Return the factors by which to shorten the steps, and the largest errors with which to repeat again, (cells,).
+def _shorter(run: Cells, errors: Errors, excess: Array, by_chance: Array, notes: Array) -> tuple[Array, Array]:
+    """Return the factors by which to shorten the steps, and the largest excess with which to repeat again, (cells,).
 
     A factor is NaN if the error is small enough, or if no shorter step is of use: a cell misses its tolerance once a
     shorter step does not help. Another method for these cells was tried: of nine that `adams` missed, `dopri5` claimed
@@ -226,19 +253,20 @@ def _shorter(run: Cells, errors: Errors, repeats: Array, most: Array) -> tuple[A
 
     Parameters
     ----------
-    repeats, most : the number of repeats so far, and the largest error with which another is of use, shape (cells,)
+    excess : the factor by which the errors have to fall, shape (cells,); infinite where it is unknown
+    by_chance : where spins agree, but not the rattles, shape (cells,)
+    notes : what is noted of the cells, shape (cells,)
     """
-    aim, first = AIM * allowed(run), repeats == 0
-    large = errors.spin > aim
-    by_chance = ~large & (OF_RATTLE * errors.rattle > aim)
-    shorter = np.fmax((errors.spin / aim) ** (1 / _ORDER), 1.0)
-    shorter = np.where(np.isinf(errors.spin) | by_chance, run.kernel.stepper.longer, shorter)
-    doubtful = first & ((errors.spin > AMPLIFIED * imbalance(run)) | (errors.apart > APART))
-    shorter = np.clip(shorter, np.where(first, 1.0, _MILD), np.where(doubtful, _MILD, SHORTEST))
+    first, coarse = notes["repeats"] == 0, run.rules.by_count & (run.tolerance > TOLERANCE)
+    unknown, doubtful = np.isinf(excess), (errors.spin > AMPLIFIED * imbalance(run)) | (errors.apart > APART)
+    shorter = np.where(unknown | by_chance, run.kernel.stepper.longer, np.fmax(excess ** (1 / _ORDER), 1.0))
+    shorter = np.clip(shorter, np.where(first, 1.0, _MILD), np.where(first & doubtful, _MILD, SHORTEST))
+    at_once = coarse & (unknown | doubtful | ~first)
+    shorter = np.where(at_once, (run.tolerance / TOLERANCE) ** (1 / _ORDER), shorter)
     long = shorter * run.table["done"] > MOST_STEPS
-    tried = (large | by_chance) & ~(errors.spin > most) & ~long & (repeats < REPEATS)
-    any_error = by_chance | (shorter < _TOO_LITTLE)
-    return np.where(tried, shorter, np.nan), np.where(any_error, np.inf, errors.spin / shorter**_LEAST_ORDER)
+    tried = ((excess > 1) | by_chance) & ~(excess > notes["most_excess"]) & ~long & (notes["repeats"] < REPEATS)
+    any_excess = by_chance | (shorter < _TOO_LITTLE) | coarse
+    return np.where(tried, shorter, np.nan), np.where(any_excess, np.inf, excess / shorter**_LEAST_ORDER)
 
 
 def progress(lives: Sequence[Lives]) -> tuple[float, int]:

@@ -29,15 +29,15 @@ FIRST, LATER = range(2)
 """Legs of a run: to `Rules.first_leg`, and to `t_end`."""
 
 NOTES = np.dtype([
-    ("stage", float), ("leg", float), ("step", float), ("step_rule", float),
+    ("stage", float), ("leg", float), ("step", float), ("step_rule", float), ("tolerance", float),
     ("halvings", float), ("step_before", float), ("met", [(name, float) for name in Met._fields]),
-    ("repeats", float), ("most_error", float), ("missed", bool), ("error", [(name, float) for name in Errors._fields]),
+    ("repeats", float), ("most_excess", float), ("missed", bool), ("error", [(name, float) for name in Errors._fields]),
     ("left", [(name, float) for name in Ending._fields]),
 ])  # fmt: skip
-"""What is noted of each cell: its stage and leg; its step, and what determined it (`STEP_RULES`); how often the step
-was halved because of a failure, the step before, and what the last run met; how often the cell was repeated because of
-its error, the largest error with which another repeat is of use, and whether it misses its tolerance; its error; and
-what was left to come of its spin when the run stopped."""
+"""What is noted of each cell: its stage and leg; its step, what determined it (`STEP_RULES`), and its tolerance;
+how often the step was halved because of a failure, the step before, and what the last run met; how often the cell was
+repeated because of its error, the largest excess of the error with which another repeat is of use, and whether it
+misses its tolerance; its error; and what was left to come of its spin when the run stopped."""
 
 
 class Run(NamedTuple):
@@ -61,9 +61,10 @@ class Second(NamedTuple):
 
 
 class Repeat(NamedTuple):
-    """Begin anew with another step."""
+    """Begin anew with another step, and perhaps another tolerance."""
 
     step: Array
+    tolerance: Array
 
 
 class Done(NamedTuple):
@@ -93,10 +94,11 @@ class Lives:
 
     def __init__(self, cells: Cells) -> None:
         self.cells, self.rows, self.notes = cells, np.empty_like(cells.rows), np.zeros(len(cells.cells), NOTES)
-        self.notes["step"], self.notes["step_rule"] = cells.step, cells.step_rule
+        for name in ("step", "step_rule", "tolerance"):
+            self.notes[name] = getattr(cells, name)
         every = np.arange(len(self.notes))
         note(self.notes, "error", every, Errors(*np.full((len(Errors._fields), len(every)), np.nan)))
-        self.notes["most_error"] = np.inf
+        self.notes["most_excess"] = np.inf
         # Pages that are never written take no memory.
         self.before, self.aside = np.zeros_like(self.rows), np.zeros_like(self.rows)
         self._begin(every, cells.rows.copy())
@@ -129,8 +131,8 @@ class Lives:
         """Return some cells with their present steps, and with copies of their state rows or of other `rows`."""
         which = np.arange(len(self.notes))[which]
         rows = (self.rows if rows is None else rows)[which]
-        step, rule = self.notes["step"][which], self.notes["step_rule"][which]
-        return replace(self.cells.take(which, rows), step=step, step_rule=rule)
+        step, rule, tolerance = (self.notes[name][which] for name in ("step", "step_rule", "tolerance"))
+        return replace(self.cells.take(which, rows), step=step, step_rule=rule, tolerance=tolerance)
 
     def left(self, which: Array | slice = slice(None)) -> Ending:
         """Return what was left to come of the spins of some cells when their runs stopped."""
@@ -153,8 +155,9 @@ class Lives:
                 self._run_again(which, APPROACH, self.take(which).start(), goal=goal)
             case Second(step, t_end, settles):
                 self._run_again(which, SECOND, self.take(which).start(step, t_end), settles=settles)
-            case Repeat(step):
-                self.notes["step"][which], self.notes["error"][which] = step, np.nan
+            case Repeat(step, tolerance):
+                self.notes["step"][which], self.notes["tolerance"][which] = step, tolerance
+                self.notes["error"][which] = np.nan
                 if not self.cells.rules.fixed:
                     self.notes["step_rule"][which] = REPEAT
                 self._begin(which, self.take(which).start())

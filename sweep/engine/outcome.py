@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from sweep.engine.cells import Cells
-from sweep.engine.errors import Errors
+from sweep.engine.errors import Errors, doubted_counts
 from sweep.engine.lives import Lives
 from sweep.engine.plan import Plan
 from sweep.grid import Array
 from sweep.kernels.methods import AUTO
 from sweep.kernels.status import COUNT_DOUBTS, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
 from sweep.results import dataset
-
-CLEAR = 10.0
-"""Required ratio of the margin of a count to its estimated error: about one in a hundred estimates is more than ten
-times too small (docs/explanation/accuracy.md)."""
 
 
 def results(job: Plan, lives: Sequence[Lives]) -> dict[str, Array]:
@@ -58,30 +54,4 @@ def _estimated(lives: Lives, cells: Cells, found: dict[str, Array]) -> dict[Doub
     spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
     errors = errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin))
     found["spin_error"] = np.where(found["doubts"] & Doubt.ROUND_OFF, np.nan, errors.reported)
-    against = {Doubt.TOLERANCE: lives.notes["missed"]}
-    if "reversals" in found:
-        against[Doubt.STEP] = errors.reversals != found["reversals"]  # a failed second run has the count NaN
-    if "margin_more" in found:
-        clear = _clear(found, errors, slows=cells.model.slows)
-        against[Doubt.MARGIN] = (found["status"] == SETTLED) & ~clear
-        against[Doubt.PARITY] = ~_consistent(cells, found)
-    return against
-
-
-def _clear(found: Mapping[str, Array], errors: Errors, *, slows: bool) -> Array:
-    """Return where both margins of a count are larger than ten times their errors, shape (cells,).
-
-    Two runs may agree in one margin by chance, however wrong both are; that they agree in both is less likely. So the
-    larger error counts for both, unless a couple slows the spin, and with it the error of the overshoot.
-    """
-    larger = np.fmax(errors.overshoot, errors.nearest_approach)
-    below = (found["reversals"] == 0) | (found["margin_fewer"] > CLEAR * larger)
-    return np.asarray(below & (found["margin_more"] > CLEAR * (errors.nearest_approach if slows else larger)))
-
-
-def _consistent(cells: Cells, found: Mapping[str, Array]) -> Array:
-    """Return where the parity of the count matches the signs of the spin at start and end, shape (cells,)."""
-    model, columns = cells.model, cells.columns
-    start, _, _ = model.energy(model.start(columns), model.constants.of(columns))
-    turned = start * found["spin_final"]
-    return np.asarray(np.where(found["reversals"] % 2 == 1, turned <= 0, turned >= 0))
+    return {Doubt.TOLERANCE: lives.notes["missed"]} | doubted_counts(cells, errors)

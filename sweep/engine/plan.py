@@ -81,14 +81,15 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     stable = StableRanges(*np.concatenate([each.ranges for each in predictions], axis=1))
     how = config.integrator
     fixed = how.step != "auto"
+    repeats, tolerance = config.repeats and not fixed, config.tolerance
     rules = Rules(
-        how.t_end, how.tolerance, how.first_leg, how.settles, fixed, how.estimate_errors, config.repeats and not fixed
+        how.t_end, tolerance, how.first_leg, how.settles, fixed, how.estimate_errors, repeats, config.by_count
     )
     parts = list[Cells]()
     for each in chosen:
         theirs = take(stable, each.cells)
         rows = each.kernel.start(each.columns, each.step, how.t_end, theirs)
-        parts.append(Cells(config.equations, rules, *each, theirs, rows))
+        parts.append(Cells(config.equations, rules, *each, np.full(len(rows), tolerance), theirs, rows))
     return Plan(config, grids, predictions, tuple(parts))
 
 
@@ -103,7 +104,7 @@ def kernels(config: Config, chosen: Sequence[Choice] = ()) -> list[Kernel]:
 
 def kernel_of(method: str, config: Config) -> Kernel:
     """Return the kernel of a method for the model and the measurements of a configuration."""
-    return _kernel(method, config.equations, config.measure, config.integrator.tolerance)
+    return _kernel(method, config.equations, config.measure, config.integrator.tolerance_number)
 
 
 def choose(config: Config, *grids: Grid) -> tuple[Choice, ...]:
@@ -140,15 +141,15 @@ def first_tolerance(config: Config, grid: Grid) -> Array:
     With the step for the tolerance itself, half of the cells of `configs/mu_b.yaml` end with less than a hundredth of
     the permitted error (scripts/LOG.md). A body that spins fast may soon lift off or topple, so its run may be short.
     """
-    how, model, columns = config.integrator, config.equations, grid.columns()
+    how, model, columns, tolerance = config.integrator, config.equations, grid.columns(), config.tolerance
     if not (how.estimate_errors and config.repeats and how.step == "auto"):
-        return np.full(grid.size, how.tolerance)
+        return np.full(grid.size, tolerance)
     least, possible = np.zeros(grid.size), ~model.impossible(columns)
     columns = take(columns, possible)
     calm = fastest_spin(model, columns) * model.slower_period(columns) < _TURN
     decay = decay_times(model, grid)[possible] * model.spin_unit(columns)
     least[possible] = np.where(calm, _DECAY_TIMES * decay, 0.0)
-    return np.asarray(how.tolerance * np.clip(least / TOLERANCE_TIME, 1.0, _LOOSEST))
+    return np.asarray(tolerance * np.clip(least / TOLERANCE_TIME, 1.0, _LOOSEST))
 
 
 def steps_of(method: str, config: Config, columns: Columns, tolerance: Tolerance | None = None) -> tuple[Array, Array]:
@@ -158,6 +159,6 @@ def steps_of(method: str, config: Config, columns: Columns, tolerance: Tolerance
     """
     step, cells = config.integrator.step, len(next(iter(columns.values())))
     if step == "auto":
-        tolerance = config.integrator.tolerance if tolerance is None else tolerance
+        tolerance = config.integrator.tolerance_number if tolerance is None else tolerance
         return methods.automatic_step(method, config.equations, columns, tolerance)
     return np.full(cells, step), np.full(cells, FIXED)

@@ -28,7 +28,10 @@ from __future__ import annotations
 from sweep.models.model import Array
 
 TOLERANCE = 1e-8
-"""Default tolerance: the error in spin at t = 400, in sqrt(g/c)."""
+"""Tolerance of whatever is not a count: the error in spin at t = 400, in sqrt(g/c)."""
+
+COARSEST = 3e-6
+"""The tolerance with which cells begin where counts decide how exact they are (`tolerance: auto`)."""
 
 Tolerance = float | Array
 """One for all cells, or one for each, shape (cells,)."""

@@ -87,8 +87,9 @@ def simulate(
     steps = np.broadcast_to(steps, cells).astype(float)
     rows = kernel.start(columns, steps, t_end, stable)
     if decide:
-        rules = Rules(t_end, tolerance, settles=settle)
-        lives = Lives(Cells(chosen, rules, kernel, np.arange(cells), columns, steps, np.zeros(cells), stable, rows))
+        rules, each = Rules(t_end, tolerance, settles=settle), np.full(cells, tolerance)
+        rule = np.zeros(cells)
+        lives = Lives(Cells(chosen, rules, kernel, np.arange(cells), columns, steps, rule, each, stable, rows))
         live([lives])
         return Ends(kernel, lives.rows, t_end)
     kernel.table(rows)["settles"] = settle

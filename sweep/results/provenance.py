@@ -141,8 +141,9 @@ def _integrator_words(config: Config) -> str:
         return "none"
     if config.integrator.step != "auto":
         return f"{config.integrator.method}, fixed step of {config.integrator.step:g} sqrt(c/g)"
-    tolerance, method = config.integrator.tolerance, config.integrator.method
+    tolerance, method = config.tolerance, config.integrator.method
     rule = f"a spin error of {tolerance:g} sqrt(g/c) at t = 400 sqrt(c/g)"
+    rule += ", and less until its count is certain" if config.by_count else ""
     if method != AUTO and METHODS[method].step_words:
         rule = f"the shorter of {METHODS[method].step_words} and {rule}"
     name = "the cheapest method" if method == AUTO else method

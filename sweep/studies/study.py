@@ -86,7 +86,7 @@ class Search(Whole):
         self.width = width
         self.rounds: list[Mapping[str, Array]] = []
         """Names of the parameters that vary, in the cells of each round."""
-        self.tolerance = config.integrator.tolerance
+        self.tolerance = config.integrator.tolerance_number
         """Tolerance of the cells requested last."""
         self.estimates = False
         """Whether their errors are estimated."""
@@ -129,7 +129,7 @@ class Search(Whole):
 
     def sharp(self, width: float) -> float:
         """Return the tolerance with which brackets are narrowed to a width."""
-        return min(self.config.integrator.tolerance, max(_FINER * width, ROUND_OFF))
+        return min(self.config.integrator.tolerance_number, max(_FINER * width, ROUND_OFF))
 
     def attributes(self) -> dict[str, Any]:
         """Return the attributes of a dataset: its accuracy, provenance and cost."""

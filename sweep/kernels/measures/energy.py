@@ -23,6 +23,7 @@ class EnergyError(Measurement):
     summary = "largest violation of the energy balance: an error that a run measures by itself"
     asks = Offer.ENERGY
     by_default = True
+    exact = False
     work = True
     quantities = ("work", "violation")
 

@@ -14,6 +14,7 @@ class Estimate(Kind):
     name = "estimate"
     summary = "reversals by the slow equations, without the oscillations, and whether they are certain"
     asks = Offer.ENDING
+    exact = False
     variables = {
         "reversals_estimated": Variable(
             "int16", NUMBER, "spin reversals, estimated", "Spin reversals by the slow equations of the `slow` model."

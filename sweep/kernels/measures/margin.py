@@ -36,6 +36,7 @@ class Margin(Measurement):
     asks = Offer.COUNT
     needs = ("reversals",)
     by_default = True
+    exact = False
     quantities = (
         *EXTREMES, "counted", "window_time", "window_size", "window_time_before", "window_size_before",
     )  # fmt: skip
@@ -86,14 +87,17 @@ class Margin(Measurement):
         return check
 
     def read(self, table: Table, times: Array, left: Ending) -> Mapping[str, Array]:
-        arc = last_arc(table, only(ends_as_predicted(table, left), left))
-        nearest = arc.nearest_approach
-        if WOUND in table.layout:
-            nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
-        return {
-            "margin_more": np.where(table["status"] == SETTLED, nearest, np.nan),
-            "margin_fewer": np.where(table["reversals"] > 0, arc.overshoot, np.nan),
-        }
+        return dict(zip(self.variables, margins(table, left), strict=True))
+
+
+def margins(table: Table, left: Ending) -> tuple[Array, Array]:
+    """Return the margins to one reversal more and to one fewer, as `Margin.read` does, each of shape (cells,)."""
+    arc = last_arc(table, only(ends_as_predicted(table, left), left))
+    nearest = arc.nearest_approach
+    if WOUND in table.layout:
+        nearest = np.where(table[WOUND] > 0, np.fmin(nearest, table[WOUND]), nearest)
+    more = np.where(table["status"] == SETTLED, nearest, np.nan)
+    return more, np.where(table["reversals"] > 0, arc.overshoot, np.nan)
 
 
 class LastArc(NamedTuple):

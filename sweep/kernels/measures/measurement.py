@@ -126,6 +126,8 @@ class Kind:
     implements `make_at_reversal` needs "reversals"."""
     by_default: ClassVar[bool] = False
     """Whether it is made by default, if the model supports it."""
+    exact: ClassVar[bool] = True
+    """Whether its values need all digits, so that `tolerance: auto` stands for 1e-8; counts and margins do not."""
     variables: ClassVar[Mapping[str, Variable]] = {}
     """The variables that it adds to the dataset, by name, each made by `measured`; `read` returns their values."""
     series: ClassVar[Mapping[str, Variable]] = {}

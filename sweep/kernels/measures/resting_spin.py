@@ -33,6 +33,7 @@ class RestingSpin(Kind):
     summary = "final spin of a settled trajectory"
     asks = Offer.MODES
     by_default = True
+    exact = False
 
     variables = {
         "spin_rest": measured(

@@ -33,6 +33,7 @@ class Reversals(Measurement):
     summary = "number of spin reversals, the time of the last, and the spin averaged over the rattle"
     asks = Offer.COUNT
     by_default = True
+    exact = False
     ripple = True
     quantities = (
         "period", "phase", "half", "earlier_half", "shifted", "closed_window", "closed_shifted",
