@@ -154,7 +154,8 @@ class Config:
         """Whether each cell is integrated only as exactly as its count needs (`tolerance: auto`)."""
         how, kinds = self.integrator, measures.chosen(self.measure)
         margins = any(kind.name == Margin.name for kind in kinds) and not any(kind.exact for kind in kinds)
-        return margins and how.tolerance == AUTO and how.step == AUTO and how.estimate_errors and self.repeats
+        repeats = self.repeats and how.estimate_errors and how.step == AUTO
+        return margins and how.settles and repeats and how.tolerance == AUTO
 
     @property
     def tolerance(self) -> float:

@@ -101,7 +101,8 @@ class Integrator(Strict):
     ] = Field(
         default="auto",
         description="permitted error in spin at t = 400, in sqrt(g/c), from which automatic steps are chosen; or "
-        f"`auto`: where counts and their margins are measured, what each count needs to be certain, else {TOLERANCE:g}",
+        f"`auto`: what each count needs to be certain, or {TOLERANCE:g} if anything but counts, margins, energy errors "
+        "and resting spins is measured, or if `stop_early` is false",
     )
     estimate_errors: bool = Field(
         default=True,
