@@ -149,7 +149,7 @@ SPECIAL = {
     "seed": lambda random: random.randrange(5),
     "integrator.t_end": lambda random: random.choice((20, 100.0, 300, 1000)),
     "integrator.step": lambda random: random.choice(("auto", 0.02, 0.05, 0.15, 1.0)),
-    "integrator.tolerance": lambda random: random.choice((1e-4, 1e-6, 1e-8, 1e-10)),
+    "integrator.tolerance": lambda random: random.choice(("auto", 1e-4, 1e-6, 1e-8, 1e-10)),
 }  # fmt: skip
 """What the schema cannot say, or what would take long."""
 
@@ -227,7 +227,7 @@ def steps(config: Config) -> float:
     model, columns, integrator = config.equations, config.grid.columns(), config.integrator
     columns = {name: column[~model.impossible(columns)] for name, column in columns.items()}
     with np.errstate(all="ignore"):
-        _, step, _ = cheapest(model, columns, integrator.tolerance, integrator.t_end)
+        _, step, _ = cheapest(model, columns, config.tolerance, integrator.t_end)
     return float((integrator.t_end / (step if integrator.step == "auto" else integrator.step + 0 * step)).sum())
 
 
