@@ -21,7 +21,8 @@ from sweep.kernels.status import SETTLED
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
 BODY = "name: small\nbody: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}\n"
-ONE = BODY + "friction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}\nintegrator: {t_end: 3000}\n"
+ONE = BODY + "friction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}\n"
+ONE += "integrator: {t_end: 3000, tolerance: 1e-8}\n"
 MORE = ONE.replace("[2.0, 3.0, 5.0]", "[1.5, 2.0, 3.0, 5.0]").replace("[40, 60]", "[40, 50, 60]")
 LATER = MORE.replace("3000", "6000")
 CASES = BODY.replace("b: [2.0, 3.0, 5.0], ", "") + "cases: cases.csv\nstart: {x0: 0.01, y0: 0.01}\n"
@@ -56,6 +57,7 @@ GROWN = {
     "more": (ONE, MORE, "12 of 24"),
     "finer": (ranged(4), ranged(10), "16 of 40"),
     "later": (ONE, LATER, ANY),
+    "more, to counts": (ONE.replace("1e-8", "auto"), MORE.replace("1e-8", "auto"), "12 of 24"),
     "more, dopri5": (by("dopri5", ONE), by("dopri5", MORE), "12 of 24"),
     "later, dopri5": (by("dopri5", ONE), by("dopri5", LATER), ANY),
     "measured": (by("adams", ONE) + MEASURED, by("adams", MORE) + MEASURED, "12 of 24"),
@@ -145,7 +147,7 @@ def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> Non
         (("[40, 60]", "[40, 70]"), "- mu: [40.0, 60.0]"),
         (("[40, 60]", "60"), "- mu: [40.0, 60.0]"),
         (("3000", "1000"), "t_end: 3000.0"),
-        (("t_end", "tolerance: 1e-6, t_end"), "tolerance: 1e-08"),
+        (("1e-8", "1e-6"), "tolerance: 1e-08"),
         (("delta: 0.03", "delta: 0.02"), "- delta: 0.03"),
         (("integrator", "measure: [reversals]\nintegrator"), "- measure:"),
     ],
