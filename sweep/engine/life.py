@@ -251,8 +251,8 @@ def _shorter(run: Cells, errors: Errors, excess: Array, by_chance: Array, notes:
     shorter step does not help. Another method for these cells was tried: of nine that `adams` missed, `dopri5` claimed
     seven, and was right in three.
 
-    With `tolerance: auto`, a cell whose motion amplifies errors, or that two coarse runs count differently, goes at once
-    to the step for `TOLERANCE`: with small factors, 20 counts of `configs/mu_b.yaml` stayed uncertain that are not.
+    With `tolerance: auto`, a cell whose motion amplifies errors, or that two coarse runs count differently, goes at
+    once to the step for `TOLERANCE`: with small factors, 20 counts of `configs/mu_b.yaml` stayed uncertain in vain.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import sweep
 from sweep.kernels.method import COARSEST, REPEAT
 
 NEAR = [(132.0, 3.2, 12), (168.0, 4.6, 17), (180.0, 3.8, 18), (196.0, 4.0, 19), (196.0, 5.0, 21)]
-"""μ, b and counts at n0 = 0.1, at tolerances of 1e-8 and 1e-10: cells whose coarse runs count otherwise, or cannot tell."""
+"""μ, b and counts at n0 = 0.1, at tolerances of 1e-8 and 1e-10: of cells whose coarse runs cannot tell."""
 
 FAR = [(60.0, 3.0, 5), (100.0, 2.0, 3)]
 
