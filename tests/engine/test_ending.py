@@ -160,7 +160,8 @@ def test_no_count_of_a_body_that_a_couple_slows_is_certain_too_early() -> None:
 NEARLY_ROUND = {
     "body": {"a": 10.0, "b": (1 + np.logspace(-6, -2, 5)).tolist(), "delta": 0.03},
     "friction": {"mu": 100.0},
-    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01}, "integrator": {"tolerance": 1e-8},
+    "start": {"n0": 0.05, "x0": 0.01, "y0": 0.01},
+    "integrator": {"tolerance": 1e-8},
 }
 
 TOO_EARLY = {
