@@ -185,10 +185,10 @@ class Model(Tier):
     upright: Callable[..., tuple[Any, ...]] = never_upright
     """(spin) -> the states of steady upright spin without rattle.  A model that does not offer `Offer.LINEAR` may
     have `fastest_motion` instead."""
-    characteristic: Callable[[Any, Any, Any], Any] | None = None
-    """(λ, n, constants) -> the characteristic polynomial of the rattle in steady upright spin n, of sixth degree in the
-    rate λ, up to a factor, by sums and products alone, because λ and n are polynomials too; by default the linear
-    theory takes the Jacobian, which needs several times as long."""
+    characteristic: Callable[[Any, Any], tuple[Any, ...]] | None = None
+    """(n, constants) -> the seven coefficients, lowest power first, of the characteristic polynomial in λ of the rattle
+    in steady upright spin n, up to a common factor, by sums and products alone, because n may be a polynomial; by
+    default the linear theory takes the Jacobian, which needs several times as long."""
     fastest_motion: Callable[[Columns], Array] | None = None
     """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by
     default the largest eigenvalue about upright spin."""

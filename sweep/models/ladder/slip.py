@@ -98,8 +98,8 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
     seen = variant.inline(record, moving_point, y=len(states))
     polynomial, scene = characteristic_of(surface, law), Constants(record._fields, variant.known)
 
-    def characteristic(rate, spin, p):
-        return polynomial(rate, spin, scene.of(p))
+    def characteristic(spin, p):
+        return polynomial(spin, scene.of(p))
 
     def observe(y: Array, p) -> dict[str, Array]:
         """Contact point, slip v_p, v̇_p, v̇_0 and normal force.

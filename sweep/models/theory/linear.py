@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from sweep.models.model import Array, Columns, Model, stack, take
-from sweep.models.theory.polynomials import RATE, Polynomial, values_and_slopes
+from sweep.models.theory.polynomials import Polynomial, values_and_slopes
 
 # Columns of a Jacobian that are computed in one call, times cells: few calls for few cells, and many stay in the cache.
 _TOGETHER = 1024
@@ -42,7 +42,7 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
 def characteristic(model: Model, constants, spin: Array) -> Array:
     """Coefficients of the characteristic polynomial in λ, lowest power first, of a model that has one, (7, cells)."""
     assert model.characteristic
-    return np.asarray(model.characteristic(RATE, spin, constants).coefficients[:, 0])
+    return stack(model.characteristic(spin, constants))
 
 
 def rates(model: Model, constants, spin: Array) -> Array:
@@ -84,8 +84,8 @@ def _roots(polynomial: Array) -> tuple[Array, Array]:
     p, q = -2 * z.real, z.real**2 + z.imag**2  # of λ² + p λ + q
     p, q = (*p, c[5] - p.sum(axis=0)), (*q, c[0] / (q[0] * q[1]))
     root = np.sqrt((p[2] ** 2 / 4 - q[2]).astype(complex))
-    one, two, three = (Polynomial(np.stack([q[i], p[i], np.ones_like(half)])[:, None]) for i in range(3))
-    again = (one * two * three).coefficients[1:5, 0]
+    one, two, three = (Polynomial(np.stack([q[i], p[i], np.ones_like(half)])) for i in range(3))
+    again = (one * two * three).coefficients[1:5]
     found = np.stack([*z, *z.conj(), -p[2] / 2 + root, -p[2] / 2 - root], axis=1)
     return found, np.asarray((np.abs(again / c[1:5] - 1) < _EXACT).all(axis=0))
 

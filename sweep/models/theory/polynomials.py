@@ -1,4 +1,4 @@
-"""Polynomials in a rate λ and a spin n for many bodies at once, and the real roots of polynomials in one variable.
+"""Polynomials of many bodies at once: sums, products, and all their real roots.
 
 The numbers of a body never depend on the other bodies.
 """
@@ -21,7 +21,7 @@ _FINE, _LEAST = 4e-15, 1e-12
 
 
 class Polynomial:
-    """A polynomial whose `coefficients`, of shape (powers of λ, powers of n, cells), are all finite."""
+    """A polynomial whose `coefficients`, lowest power first, have the shape (powers, cells)."""
 
     __array_ufunc__ = None  # an array leaves operations with a polynomial to this class
 
@@ -29,19 +29,19 @@ class Polynomial:
         self.coefficients = coefficients
 
     def __add__(self, other: Any) -> Polynomial:
-        one, two = self.coefficients, _coefficients(other)
-        size = np.maximum(one.shape[:2], two.shape[:2])
-        total = np.zeros((*size, *np.broadcast_shapes(one.shape[2:], two.shape[2:])))
-        for each in (one, two):
-            total[: each.shape[0], : each.shape[1]] += each
+        one, two = sorted((self.coefficients, polynomial(other).coefficients), key=len)
+        total = np.zeros((len(two), *np.broadcast_shapes(one.shape[1:], two.shape[1:])))
+        total += two
+        total[: len(one)] += one
         return Polynomial(total)
 
     def __mul__(self, other: Any) -> Polynomial:
-        one, two = sorted((self.coefficients, _coefficients(other)), key=lambda each: each.shape[0] * each.shape[1])
-        size = [a + b - 1 for a, b in zip(one.shape[:2], two.shape[:2], strict=True)]
-        product = np.zeros((*size, *np.broadcast_shapes(one.shape[2:], two.shape[2:])))
-        for i, j in np.argwhere(one.any(axis=2)):
-            product[i : i + two.shape[0], j : j + two.shape[1]] += one[i, j] * two
+        one, two = sorted((self.coefficients, polynomial(other).coefficients), key=len)
+        if len(one) == 1:
+            return Polynomial(one * two)
+        product = np.zeros((len(one) + len(two) - 1, *np.broadcast_shapes(one.shape[1:], two.shape[1:])))
+        for i, each in enumerate(one):
+            product[i : i + len(two)] += each * two
         return Polynomial(product)
 
     def __sub__(self, other: Any) -> Any:
@@ -50,15 +50,19 @@ class Polynomial:
     def __rsub__(self, other: Any) -> Any:
         return self * -1.0 + other
 
+    def __neg__(self) -> Polynomial:
+        return self * -1.0
+
     __radd__, __rmul__ = __add__, __mul__
 
 
-def _coefficients(value: Any) -> Array:
-    return value.coefficients if isinstance(value, Polynomial) else np.array(value, float, ndmin=3)
+def polynomial(value: Any) -> Polynomial:
+    """Return a polynomial itself, or a number or an array over the cells as a constant polynomial."""
+    return value if isinstance(value, Polynomial) else Polynomial(np.array(value, float, ndmin=2))
 
 
-RATE, SPIN = Polynomial(np.array([[[0.0]], [[1.0]]])), Polynomial(np.array([[[0.0], [1.0]]]))
-"""λ and n themselves."""
+X = Polynomial(np.array([[0.0], [1.0]]))
+"""The variable itself."""
 
 
 def real_roots(coefficients: Array, limit: Array) -> tuple[Array, Array]:

@@ -22,6 +22,7 @@ a = 1.5 … 50, |δ| <= 0.5, μ = 0.1 … 5000) and took three times as long.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -29,7 +30,7 @@ import numpy as np
 
 from sweep.models.model import Array, Columns, Model, stack, take
 from sweep.models.theory.linear import characteristic, growth_rate, jacobian
-from sweep.models.theory.polynomials import RATE, SPIN, Polynomial, real_roots, values_and_slopes
+from sweep.models.theory.polynomials import Polynomial, X, polynomial, real_roots, values_and_slopes
 
 SPIN_LIMIT = 10.0
 """Largest |spin| examined, in sqrt(g/c), fifty times the spin that a hand gives: upright spin that is stable up to
@@ -140,14 +141,14 @@ def _changes(model: Model, constants, limits: Array) -> Array:
     """Find all spins within limits at which stability may change, shape (cells, solutions): NaN in place of others."""
     if not model.characteristic:
         return _by_matrices(*_polynomial(model, constants))
-    polynomial = model.characteristic(RATE, SPIN, constants).coefficients
-    of_zero, of_pairs = polynomial[0], _resultant(*polynomial)
+    polynomials = [*map(polynomial, model.characteristic(X, constants))]
+    of_zero, of_pairs = polynomials[0].coefficients, _resultant(polynomials)
     found = []
     for sign in (1.0, -1.0):
         cells, spins = real_roots(of_zero * sign ** np.arange(len(of_zero))[:, None], limits)
         found.append((cells, sign * spins))
         cells, spins = real_roots(of_pairs * sign ** np.arange(len(of_pairs))[:, None], limits)
-        found.append((cells, _polished(polynomial[:, :, cells], sign * spins)))
+        found.append((cells, _polished([each.coefficients[:, cells] for each in polynomials], sign * spins)))
     cells, spins = map(np.concatenate, zip(*found, strict=True))
     order = np.argsort(cells, kind="stable")
     cells, spins = cells[order], spins[order]
@@ -157,13 +158,14 @@ def _changes(model: Model, constants, limits: Array) -> Array:
     return changes
 
 
-def _resultant(*coefficients: Array) -> Array:
+def _resultant(polynomials: Sequence[Polynomial]) -> Array:
     """Return the polynomial in n that vanishes where λ and -λ are roots of one in λ, shape (powers of n, cells).
 
     With s = -λ² these obey c0 - c2 s + c4 s² - c6 s³ = 0 and c1 - c3 s + c5 s² = 0.
     """
-    u, v, w = _eliminated(*(Polynomial(each[None]) for each in coefficients))
-    return np.asarray((u * u - v * w).coefficients[0])
+    u, v, w = _eliminated(*polynomials)
+    found: Polynomial = u * u - v * w
+    return found.coefficients
 
 
 def _eliminated(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, c5: Any, c6: Any) -> tuple[Any, Any, Any]:
@@ -173,16 +175,17 @@ def _eliminated(c0: Any, c1: Any, c2: Any, c3: Any, c4: Any, c5: Any, c6: Any) -
 
 
 @np.errstate(all="ignore")
-def _polished(polynomial: Array, spins: Array) -> Array:
+def _polished(polynomials: Sequence[Array], spins: Array) -> Array:
     """Solve the equations of `_resultant` by two of Newton's steps, because the resultant loses digits, shape (roots,).
 
-    `polynomial` has the shape (powers of λ, powers of n, roots).
+    The `polynomials` in n have the shape (powers, roots), one for each power of λ.
     """
-    by_powers, found = polynomial.swapaxes(0, 1), spins
-    u, v, _ = _eliminated(*values_and_slopes(by_powers, spins)[0])
-    s = -u / v
+    found, s = spins, None
     for _ in range(2):
-        c, slope = values_and_slopes(by_powers, found)
+        c, slope = zip(*(values_and_slopes(each, found) for each in polynomials), strict=True)
+        if s is None:
+            u, v, _ = _eliminated(*c)
+            s = -u / v
         even, odd = c[0] - s * (c[2] - s * (c[4] - s * c[6])), c[1] - s * (c[3] - s * c[5])
         even_s, odd_s = s * (2 * c[4] - 3 * s * c[6]) - c[2], 2 * s * c[5] - c[3]
         even_n, odd_n = slope[0] - s * (slope[2] - s * slope[4]), slope[1] - s * slope[3]
