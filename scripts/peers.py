@@ -71,8 +71,19 @@ COMPARED = 8
 OURS = (1e-4, 1e-6, 1e-8, 1e-10)
 """Tolerances of sweep's runs; the others' are such that the errors cover the same range."""
 HEYOKA, DOP853, LSODA, TSIT5 = (1e-3, 1e-6, 1e-9), (1e-4, 1e-7, 1e-10), (1e-6, 1e-8, 1e-10), (1e-4, 1e-6, 1e-8)
-MARKERS = "os^v<D>px+"
-"""Of the curves of the picture, in their order; their colours are matplotlib's."""
+CURVES = {
+    "sweep, auto": ("C3", "-", "o", ""),
+    "sweep, auto, counts alone": ("C3", "-", "o", "white"),
+    "sweep, dopri5": ("C1", "-", "s", ""),
+    "sweep, dopri5, counts alone": ("C1", "-", "s", "white"),
+    "heyoka batch": ("C0", "-", "^", ""),
+    "numbalsoda DOP853": ("C2", "-", "v", ""),
+    "numbalsoda LSODA": ("C2", "--", "<", ""),
+    "diffrax Tsit5": ("C4", "-", "D", ""),
+    "SciPy DOP853, 1 process": ("0.4", "-", "x", ""),
+    "SciPy LSODA, 1 process": ("0.4", "--", "+", ""),
+}
+"""The tools of the picture, with colour, dash, marker and colour of its face if that is another."""
 RTOL_TO_ATOL = 1e-3
 """Absolute over relative tolerance: the rattle's states are of order 1e-3."""
 
@@ -341,22 +352,28 @@ def write(path: Path, found: dict[float, list[Entry]]) -> None:
                 rows.writerow([f"{mu:g}", e.tool, e.setting, e.problem.size, *times, f"{e.error:.2g}"])
 
 
-def draw(path: Path, found: dict[float, list[Entry]]) -> None:
-    """Draw speed against error, a panel for each friction."""
+def draw(table: Path, picture: Path) -> None:
+    """Draw speed against error from the table, a panel for each friction, as wide as a page of the documentation."""
     from matplotlib.figure import Figure
 
-    figure = Figure((3.6 * len(found) + 0.6, 5), dpi=110, layout="constrained")
-    grid = figure.subplots(1, len(found), sharey=True, squeeze=False).ravel()
-    for axes, (mu, entries) in zip(grid, found.items(), strict=True):
-        for tool, marker in zip(dict.fromkeys(e.tool for e in entries), MARKERS, strict=False):
-            some = sorted((e for e in entries if e.tool == tool), key=Entry.milliseconds)
-            axes.loglog([e.error for e in some], [e.milliseconds() for e in some], label=tool, marker=marker)
-        axes.set(title=f"μ = {mu:g}", xlabel="largest error in spin", xlim=(2e-13, 1e-3))
+    with table.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    frictions = list(dict.fromkeys(row["mu"] for row in rows))
+    figure = Figure((9.0, 4.2), dpi=110, layout="constrained")
+    grid = figure.subplots(1, len(frictions), sharey=True, squeeze=False).ravel()
+    for axes, mu in zip(grid, frictions, strict=True):
+        for tool, (colour, dash, marker, face) in CURVES.items():
+            some = [(float(row["largest_error"]), float(row["ms_per_trajectory"]))
+                    for row in rows if (row["mu"], row["tool"]) == (mu, tool)]  # fmt: skip
+            errors, times = zip(*sorted(some, key=lambda pair: pair[1]), strict=True) if some else ((), ())
+            axes.loglog(errors, times, color=colour, linestyle=dash, marker=marker, markersize=4.5,
+                        markerfacecolor=face or colour, linewidth=1.2, label=tool)  # fmt: skip
+        axes.set(title=f"μ = {mu}", xlabel="largest error in spin", xlim=(2e-13, 1e-3))
         axes.grid(alpha=0.3)
     grid[0].set_ylabel("milliseconds per trajectory")
     handles, names = grid[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
-    figure.savefig(path)
+    figure.legend(handles, names, loc="outside lower center", ncols=3, frameon=False)
+    figure.savefig(picture)
 
 
 def main(output: Path) -> None:
@@ -371,7 +388,7 @@ def main(output: Path) -> None:
         found[mu] = prepare(Problem(mu, np.linspace(2.0, 8.0, BODIES)))
         measure(found[mu])
         write(output / "peers.csv", found)
-        draw(output / "peers.png", found)
+        draw(output / "peers.csv", output / "peers.png")
 
 
 if __name__ == "__main__":

@@ -60,8 +60,8 @@ _OF_LABEL = 0.085
 _OF_CONSTANTS, _LONGEST = 1 / 13, 90
 """Inches per letter of the constant parameters, and the largest number of letters in a line."""
 
-_UNIT, _PARAMETER = r"(?<= )\(.*\)$|\S+ = \S+", "[^, ][^,]*"
-"""Patterns kept on one line: the unit at the end of a label, a value; a constant with its unit."""
+_UNIT, _PARAMETER = r"(?m)(?:(?<!\S)\S{1,2} |(?<= ))\(.*\)$|\S+ = \S+", "[^, ][^,]*"
+"""Patterns kept on one line: the unit at the end of a label with its symbol, a value; a constant with its unit."""
 
 _LEAST = 1.2
 """Smallest width of a map in inches."""

@@ -130,7 +130,11 @@ def constants(dataset: xr.Dataset) -> str:
     ordered = [name for name in parameters(dataset) if name in numbers]
     fixed = [measured(dataset, name, numbers[name]) for name in dict.fromkeys([*ordered, *numbers])]
     known = {str(name): v.attrs["distribution"] for name, v in dataset.coords.items() if "distribution" in v.attrs}
-    sampled = [f"{symbol(name)}: {words}{si_unit(dataset, name)}" for name, words in known.items()]
+    numbers = re.compile(r"(?<= )-?\d[\d.e+-]*")
+    sampled = [
+        f"{symbol(name)}: {numbers.sub(lambda match: number(float(match[0])), words)}{si_unit(dataset, name)}"
+        for name, words in known.items()
+    ]
     return ", ".join([*fixed, *sampled])
 
 

@@ -30,8 +30,8 @@ _PANELS: tuple[tuple[str, dict[str, str]], ...] = (
     ("normal coordinate Y", {"mode_2": "Y"}),
     ("amplitude A of the first mode", {"amplitude_1": "A"}),
     ("amplitude B of the second mode", {"amplitude_2": "B"}),
-    ("acceleration along x", {"v0_rate_1": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_1": "dv$_p$/dt, of the slip"}),
-    ("acceleration along y", {"v0_rate_2": "dv₀/dt, v₀ = x$_p$ × ω", "slip_rate_2": "dv$_p$/dt, of the slip"}),
+    ("acceleration along x", {"v0_rate_1": "of rolling", "slip_rate_1": "of slip"}),
+    ("acceleration along y", {"v0_rate_2": "of rolling", "slip_rate_2": "of slip"}),
     ("normal force R per mass", {"normal_force": "R"}),
     ("energy per mass", {"energy": "above rest", "dissipated": "work against friction"}),
 )
