@@ -144,7 +144,7 @@ def boundaries(
     The cells of the configuration are simulated first. Where two neighbours along `x` or `y` have different counts,
     further simulations bracket the place between them at which each count begins. Halfway between two points, two more
     cells check whether the smooth curve passes between them; if not, a point is added there. Curves are found for each
-    value of the other axes. Along a single axis, cells where the averaged equations estimate another count are
+    value of the other axes. Along a single axis, cells where the slow equations estimate another count are
     simulated as well.
 
     Parameters
@@ -236,7 +236,7 @@ def trajectory(
 ) -> xr.Dataset:
     """Follow the cells of a sweep with dense output, up to t_end.
 
-    The method is always dopri5, whatever the configuration names: it alone can stop after any step for a sample.
+    The method is always dopri5, whatever the configuration names, because only dopri5 can stop anywhere for a sample.
 
     Parameters
     ----------
@@ -351,9 +351,9 @@ def fit(
         smallest and the largest. The range of a free parameter with a single value is found from the film and the body,
         and widened if the best value lies at its end. A parameter given as a distribution is also free, and the
         distribution counts as a measurement
-    film : a table of numbers with a header: a time, and a spin ("spin (rad/s)"), the gyroscope reading of a phone on
-        the body ("Gyroscope z (rad/s)") or a heading ("angle (deg)"). Intervals are computed from a column "error" if
-        there is one, otherwise from the residuals. Or a `sweep.config.film.Film`
+    film : a `sweep.config.film.Film`, or a table of numbers with a header: a time, and a spin ("spin (rad/s)"), the
+        gyroscope reading of a phone on the body ("Gyroscope z (rad/s)") or a heading ("angle (deg)"). Intervals are
+        computed from a column "error" if there is one, otherwise from the residuals
     time_column, spin_column : names of the columns of the film, with a unit if it gives none, such as "omega (deg/s)";
         by default columns with known names
     free : names of the parameters to find, including film_delay and film_bias of the film itself
@@ -388,7 +388,7 @@ def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:
     Parameters
     ----------
     dataset : a run or critical spins, as a dataset or the path of its file
-    height : of the page in the notebook, in pixels
+    height : height of the page in the notebook, in pixels
 
     Returns
     -------
@@ -452,7 +452,7 @@ def open_dataset(path: str | os.PathLike[str], *, load: bool = True) -> xr.Datas
 
     Parameters
     ----------
-    path : of the netCDF file
+    path : path of the netCDF file
     load : read the dataset into memory and close the file. If False, values are read on demand, and the file stays open
         until the dataset is closed
 

@@ -79,27 +79,26 @@ def plot(
     Parameters
     ----------
     dataset : a dataset, the path of its file, or one of its variables, whose cells then have no marks
-    variable : of the dataset, or one of `sweep.plots.pictures.PICTURES`.  Maps that compare two variables are shown
-        together with these, except in a figure as narrow as a column of text.  By default
-        the first that the configuration names under `picture`, or else the reversals, compared with the prediction if
-        there is one
+    variable : a variable of the dataset, or one of `sweep.plots.pictures.PICTURES`.  A comparison of two variables is
+        drawn next to both, except in a figure as narrow as a column of text.  The default is the first one that the
+        configuration names under `picture`, or else the reversals, compared with the prediction if there is one
     x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
         the values of the other axes gets a panel, up to eight
     at : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
     vmin, vmax : lowest and highest value of the scale, or of the vertical axis of curves; by default those that are
         drawn
     cmap : name of a colour map of matplotlib
-    width : of a figure for print, with its unit, such as "85mm": no text is smaller than 6 points, except subscripts,
+    width : width of a figure for print, such as "85mm": no text is smaller than 6 points, except subscripts,
         and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
-        that was changed.  The height follows from the panels
-    title : of the figure, "" for none; by default that of the dataset
+        you have changed it.  The height follows from the panels
+    title : title of the figure, "" for none; by default the title of the dataset
     ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
     output : file to write; its suffix names the format: png, pdf or svg
 
     Returns
     -------
-    The figure.  Boundaries and fits have their own figures, the same as those of the commands that find them; so have
-    critical spins and trajectories if no `variable` is named.
+    The figure.  Boundaries and fits are drawn as by the commands that find them; so are critical spins and
+    trajectories, if no `variable` is named.
 
     Raises
     ------

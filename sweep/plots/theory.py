@@ -146,19 +146,18 @@ def _over_spins(values: xr.DataArray, x: Axis, y: Axis) -> list[Points]:
     if other.name in values.dims and len(along) > 1:
         first, last = axis.edges[[0, -1]]
         along = np.concatenate([[first], along, [last]])
-        inverse = _to_edges(1 / spins)
-        spins = np.divide(1, inverse, out=np.full_like(inverse, np.nan), where=inverse != 0)
+        spins = 1 / _to_edges(1 / spins)
     return [(spins, along) if spin is x else (along, spins)]
 
 
 def _to_edges(inverse: Array) -> Array:
-    """Continue 1/n_c, which is proportional to μ, in a straight line to the edges of the outer cells, or else to zero.
+    """Continue 1/n_c, which is proportional to μ, in a straight line to the edges of the outer cells.
 
-    It is zero where the body is round, and nowhere changes its sign.
+    It nowhere changes its sign; where the line would, next to a round body, a quarter of the last value stands for it.
     """
     level = np.pad(inverse, 1, mode="edge")
     straight = (level + np.pad(inverse, 1, mode="reflect", reflect_type="odd")) / 2
-    return np.where(straight * level < 0, 0.0, straight)
+    return np.where(straight * level < 0, level / 4, straight)
 
 
 def _contours(values: xr.DataArray, n0: float, x: Axis, y: Axis) -> list[Points]:
