@@ -194,10 +194,12 @@ def _doubts(dataset: xr.Dataset, counts: int) -> Iterator[str]:
             helps = bit != Doubt.TIME_LIMIT or not never_settles(dataset)
             yield f"  {int(these.sum())}{_place(these)}: {words}{f'; {remedy}' if helps else ''}"
     if missed := int((doubts & int(Doubt.TOLERANCE) > 0).sum()):
-        error = f": spin errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
-        yield f"{missed} of {counted(counts, 'cell')} {'misses' if missed == 1 else 'miss'} the tolerance{error}"
+        error = f", with errors up to {dataset['spin_error'].max().item():.1e}" if "spin_error" in dataset else ""
+        miss = "misses" if missed == 1 else "miss"
+        yield f"final spins: {missed} of {counted(counts, 'cell')} {miss} the tolerance{error}"
     if noisy := int((doubts & int(Doubt.ROUND_OFF) > 0).sum()):
-        yield f"in {counted(noisy, 'cell')} round-off decides when late reversals come: spin errors are unknown there"
+        where = counted(noisy, "cell")
+        yield f"late reversals: round-off decides their times in {where}, where spin errors are unknown"
 
 
 def _place(where: xr.DataArray) -> str:
@@ -249,7 +251,7 @@ def _reversals(dataset: xr.Dataset, valid: np.ndarray) -> str:
     if "reversals_predicted" not in dataset:
         return text
     off = abs(counts - np.ravel(dataset["reversals_predicted"].values)[valid])
-    return f"{text}, as predicted in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
+    return f"{text}; predicted correctly in {(off == 0).mean():.1%} of the cells, within one in {(off <= 1).mean():.1%}"
 
 
 _LINES: dict[Kind | None, Callable[[xr.Dataset], Iterator[str]]] = {

@@ -102,12 +102,12 @@ def test_the_last_lines_of_a_run_say_which_counts_are_certain_and_what_to_do_abo
     doubts = {"certain": ("mu", [1, 0, 0, 1]), "doubts": ("mu", bits)}
     errors = {"spin_error": ("mu", [1e-9, 2e-3, np.nan, 1e-9]), "mu": [10.0, 20.0, 30.0, 40.0], **doubts}
     assert summary(**rules, **counts, **errors).splitlines() == [
-        "4 cells (mu 4): 3 settled, 1 time_limit; 1 to 5 reversals, "
-        "as predicted in 50.0% of the cells, within one in 75.0%",
+        "4 cells (mu 4): 3 settled, 1 time_limit; 1 to 5 reversals; "
+        "predicted correctly in 50.0% of the cells, within one in 75.0%",
         "2 of 4 counts are certain; the others:",
         "  1, at mu = 30: the time limit came first, so more reversals may follow; raise t_end",
         "  1, at mu = 20: longer steps give a different number of reversals; lower the tolerance",
-        "2 of 4 cells miss the tolerance: spin errors up to 2.0e-03",
+        "final spins: 2 of 4 cells miss the tolerance, with errors up to 2.0e-03",
         "spin error: median 1.0e-09, largest 2.0e-03, as estimated",
         "step: 1 to 4, set by accuracy in 1 cell, repeat in 3 cells",
     ]
