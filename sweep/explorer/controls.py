@@ -42,7 +42,7 @@ class MapControls:
         self._limits = {name: self._limit(name, words) for name, words in LIMITS.items()}
         self.root = Row(children=[*self._widgets.values(), *self._limits.values()], name="controls",
                         stylesheets=[WIDGETS], sizing_mode="stretch_width",
-                        styles={"gap": "10px 14px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
+                        styles={"gap": "10px 12px", "flex-wrap": "wrap", "align-items": "flex-end"})  # fmt: skip
 
     def show(self, state: State) -> None:
         """Set the widgets to what is shown."""
@@ -68,7 +68,7 @@ class MapControls:
             on(slider, "value_throttled", partial(self._pick, choice))
             return slider
         named = list(zip(choice.options, choice.words, strict=True))
-        choose = Select(options=named, width=230 if choice.name == "show" else 140, **common)
+        choose = Select(options=named, width=220 if choice.name == "show" else 140, **common)
         on(choose, "value", lambda option: self._pick(choice, choice.find(option)))
         return choose
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -76,12 +76,13 @@ def describe(dataset: xr.Dataset, name: str, x: str, y: str = "", shared: Mappin
     across, up = Axis(x, along(dataset, x)), Axis(y, along(dataset, y))
     lines = theory.lines(dataset, across, up) if y and of(name).theory else []
     lines += boundaries(dataset, across, up) if y and of(name).boundaries else []
+    frame = ends(dataset, across), ends(dataset, up)
     return Map(
         name, across, up, table(found, across, up),
         {kind: table(where & (kind not in notes), across, up) for kind, where in kinds.items()},
         words, (*notes.values(), *_wider(dataset, across, up)),
-        labels.flag_words(dataset.assign({name: found}), name), lines,
-        (ends(dataset, across), ends(dataset, up)),
+        labels.flag_words(dataset.assign({name: found}), name), list(_visible(lines, *frame)),
+        frame,
     )  # fmt: skip
 
 
@@ -94,6 +95,14 @@ def ends(dataset: xr.Dataset, axis: Axis) -> Array:
     if axis.name == "b" and "a" in dataset and not dataset["a"].ndim and axis.values[0] < dataset["a"]:
         high = min(high, float(dataset["a"]))
     return np.array([low, high])
+
+
+def _visible(lines: list[Line], x: Array, y: Array) -> Iterator[Line]:
+    """Yield the lines with the parts of them that a frame with these ends shows."""
+    for line in lines:
+        inside = [np.any((x[0] <= a) & (a <= x[1]) & (y[0] <= b) & (b <= y[1])) for a, b in line.parts]
+        if any(inside):
+            yield replace(line, parts=[part for part, within in zip(line.parts, inside, strict=True) if within])
 
 
 def _wider(dataset: xr.Dataset, *axes: Axis) -> Iterator[str]:
