@@ -205,7 +205,7 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
 def _of_count(run: Cells, errors: Errors) -> Array:
     """Return the factor by which errors have to fall for a count to be certain, shape (cells,).
 
-    It is infinite where nothing tells it: another count, or a spin that cannot be predicted beyond the first leg.
+    It is infinite where this is unknown: with another count, or a spin that cannot be predicted beyond the first leg.
     """
     against, unpredicted = doubted_counts(run, errors), run.rules.first_leg is not None
     another = against[Doubt.STEP] | against[Doubt.PARITY] | (unpredicted & (run.status == TIME_LIMIT))

@@ -34,7 +34,7 @@ COARSEST = 3e-6
 """The tolerance with which cells begin where counts decide how exact they are (`tolerance: auto`).
 
 With 1e-6, 3e-6, 1e-5 and 3e-5, `configs/mu_b.yaml` takes 38, 32, 33 and 32 s of processor time; the first runs count
-4, 8, 27 and 28 cells otherwise than a tolerance of 1e-8, and with 3e-5 two runs of one of them agree by chance. Skips
+4, 8, 27 and 28 cells differently from a tolerance of 1e-8, and with 3e-5 two runs of one of them agree by chance. Skips
 and rescaling stay exact to `TOLERANCE`: a coarser one for them saved nothing."""
 
 Tolerance = float | Array

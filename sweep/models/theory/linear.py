@@ -49,8 +49,8 @@ def rates(model: Model, constants, spin: Array) -> Array:
     """Find the eigenvalues λ of the rattle, in sqrt(g/c), shape (cells, m), where m is the number of states without the
     spin.
 
-    Of a model without a characteristic polynomial, and where the roots of that cannot be found with certainty, they are
-    those of the Jacobian.
+    They are the roots of the characteristic polynomial; if a model has none, or its roots cannot be found with
+    certainty, they are the eigenvalues of the Jacobian.
     """
     if not model.characteristic:
         return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)))
