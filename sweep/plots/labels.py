@@ -15,6 +15,9 @@ from sweep.results.kind import is_of_own_body, parameters
 from sweep.units import SUPERSCRIPT, is_of_paper, pretty
 from sweep.variables import Variable
 
+_NUMBER = re.compile(r"(?<= )-?\d[\d.e+-]*")
+"""A number in the words for a distribution."""
+
 _ORIGIN = re.compile(", (simulated|estimated|predicted.*)$")
 """The end of the words for a variable that has a prediction."""
 
@@ -130,9 +133,8 @@ def constants(dataset: xr.Dataset) -> str:
     ordered = [name for name in parameters(dataset) if name in numbers]
     fixed = [measured(dataset, name, numbers[name]) for name in dict.fromkeys([*ordered, *numbers])]
     known = {str(name): v.attrs["distribution"] for name, v in dataset.coords.items() if "distribution" in v.attrs}
-    numbers = re.compile(r"(?<= )-?\d[\d.e+-]*")
     sampled = [
-        f"{symbol(name)}: {numbers.sub(lambda match: number(float(match[0])), words)}{si_unit(dataset, name)}"
+        f"{symbol(name)}: {_NUMBER.sub(lambda match: number(float(match[0])), words)}{si_unit(dataset, name)}"
         for name, words in known.items()
     ]
     return ", ".join([*fixed, *sampled])
