@@ -60,7 +60,7 @@ GROWN = {
     "more, to counts": (ONE.replace("1e-8", "auto"), MORE.replace("1e-8", "auto"), "12 of 24"),
     "more, dopri5": (by("dopri5", ONE), by("dopri5", MORE), "12 of 24"),
     "later, dopri5": (by("dopri5", ONE), by("dopri5", LATER), ANY),
-    "measured": (by("adams", ONE) + MEASURED, by("adams", MORE) + MEASURED, "12 of 24"),
+    "measured": (by("dopri5", ONE) + MEASURED, by("dopri5", MORE) + MEASURED, "12 of 24"),
     "measured further": (by("dopri5", ONE) + "measure: []\n", by("dopri5", ONE) + MEASURED, "no"),
     "single": (SINGLE, SINGLE.replace("100", "300"), "no"),
     # Axes that the paper's models do not have, each from one value to several.

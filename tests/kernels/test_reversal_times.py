@@ -14,7 +14,7 @@ name: times
 body: {b: 3.0}
 friction: {mu: [60, 75, 100]}
 start: {n0: 0.05}
-integrator: {t_end: 3000}
+integrator: {t_end: 3000, method: dopri5}
 measure: [reversals, {reversal_times: 3}]
 """
 
@@ -35,6 +35,11 @@ def found(config: Path) -> xr.Dataset:
 @pytest.mark.parametrize("mu", EXPECTED)
 def test_times_are_those_of_an_independent_integrator(found: xr.Dataset, mu: int) -> None:
     np.testing.assert_allclose(found.reversal_times.sel(mu=mu), EXPECTED[mu], atol=1.0)
+
+
+@pytest.mark.campaign
+def test_adams_finds_the_same_times(found: xr.Dataset, config: Path) -> None:
+    np.testing.assert_allclose(sweep.run(config, method="adams").reversal_times, found.reversal_times, rtol=1e-5)
 
 
 def test_later_reversals_are_counted_but_not_kept(found: xr.Dataset) -> None:

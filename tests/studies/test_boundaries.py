@@ -20,7 +20,7 @@ from sweep.axis import Axis
 from sweep.grid import Array
 from sweep.kernels.status import SETTLED
 from sweep.plots import description, picture
-from sweep.results.margins import FOUND, WIDE, Counts, distinct, smoothed
+from sweep.results.margins import FOUND, WIDE, Counts, smoothed
 from sweep.results.store import Store
 from sweep.studies.boundaries import Boundaries
 from sweep.studies.curve import Cell, Curve, Point
@@ -168,13 +168,6 @@ def test_a_curve_through_cells_of_the_grid_is_followed_all_around(sign: int, siz
     long = [point for point, way in zip(curve.points, ways, strict=True) if way > 0.1]
     assert len(long) >= 8
     assert all(curve.middles[id(point)].confirmed for point in long)
-
-
-@pytest.mark.parametrize(("closed", "last"), [(False, True), (True, False)])
-def test_points_that_coincide_are_taken_once(closed: bool, last: bool) -> None:
-    """The last point of a closed curve also with the first."""
-    x, y = np.array([[0.1, 0.1, 0.4, 0.1], [0.2, 0.2, 0.2, 0.2]])
-    assert distinct(x, y, closed=closed).tolist() == [False, True, True, last]
 
 
 @pytest.mark.parametrize("closed", [False, True])

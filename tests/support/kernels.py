@@ -88,7 +88,6 @@ def threads(number: int) -> Iterator[None]:
 SHARED = [
     ("adams", "slip", (*default_measures("slip"), "estimate")),
     ("dopri5", "slip", default_measures("slip")),
-    ("adams", "slip", ("reversals", "reversal_times=3")),
     ("dopri5", "noslip", default_measures("noslip")),
     ("dopri5", "effective", default_measures("effective")),
     ("dopri5", "averaged", default_measures("averaged")),
