@@ -26,6 +26,7 @@ from sweep.kernels.measures import MEASURES, chosen
 from sweep.kernels.measures.measurement import Measurement
 from sweep.kernels.methods import AUTO, automatic, cheapest
 from sweep.models import TIERS
+from sweep.models.general.solids import SOLIDS
 from sweep.parameters import PARAMETERS, Parameter
 from sweep.plots.quantities import DERIVED, check_pictures
 from sweep.results.dataset import VARIABLES
@@ -68,10 +69,17 @@ def numbers(value: Any) -> list[float]:
     return value if isinstance(value, list) else [value]
 
 
+MEASURED: Flat = {
+    "units": "SI", "body.solid": "half_ellipsoid", "body.length": 0.12, "body.width": 0.036, "body.height": 0.016,
+    "body.mass": 0.052, "body.angle": 0.035, "friction.mu": 30, "start.n0": 5, "start.x0": 1e-3, "start.y0": 3e-4,
+}  # fmt: skip
+"""A body by its sizes."""
+
+
 @cache
 def shipped() -> dict[str, Flat]:
-    """The configurations that come with the package and need no code of a user, with two values an axis."""
-    found: dict[str, Flat] = {"paper": {"friction.mu": 60}}
+    """The configurations that come with the package and need no code of a user, and two more; two values an axis."""
+    found: dict[str, Flat] = {"paper": {"friction.mu": 60}, "measured": dict(MEASURED)}
     for file in sorted((ROOT / "configs").glob("*.yaml")):
         flat = flattened(YAML(typ="safe").load(file.read_text(encoding="utf-8")))
         if flat.get("model", "slip") in TIERS:
@@ -133,6 +141,12 @@ def _measure(random: Random) -> Any:
     return [{name: random.randint(b[0], min(b[1], 4))} if (b := bounds[name]) else name for name in names]
 
 
+def _weights(random: Random) -> Any:
+    """Two of the same mass, on opposite sides of the centre."""
+    mass, along, across = random.choice((1e-4, 1e-3)), random.choice((0.01, 0.02)), random.choice((-0.002, 0.002))
+    return [{"mass": mass, "at": [sign * along, sign * across, 0]} for sign in (1, -1)]
+
+
 def _cases(random: Random) -> Any:
     names = random.sample(["n0", "mu", "b", random.choice(sorted(PARAMETERS))], random.choice((1, 2)))
     return {
@@ -145,6 +159,8 @@ SPECIAL = {
     "measure": _measure,
     "cases": _cases,
     "picture": lambda random: random.sample([*VARIABLES, *DERIVED], random.choice((1, 2))),
+    "body.solid": lambda random: random.choice(sorted(SOLIDS)),
+    "body.weights": _weights,
     "samples": lambda random: random.choice((1, 2, 3, 5)),
     "seed": lambda random: random.randrange(5),
     "integrator.t_end": lambda random: random.choice((20, 100.0, 300, 1000)),
