@@ -123,7 +123,7 @@ def growth_coefficients(model: Model, columns: Columns) -> Array:
     """Coefficients c_i of Re λ(n) = Σ c_i n^i for the slower and the faster mode, shape (2, nodes, cells).
 
     The polynomial is fitted at five spins, in units of the fastest spin within reach; this is rounded up, so that
-    most starts of a body share a fit.  Five spins take 0.3 s for 4000 bodies.
+    most starts of a body share a fit.
     """
     full = form_of(model).full
     reach = np.exp2(np.ceil(8 * np.log2(np.maximum(linear.fastest_spin(full, columns), 1e-6))) / 8)

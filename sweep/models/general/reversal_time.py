@@ -1,13 +1,11 @@
-"""The time of the first reversal by Garcia and Hubbard (1988), for any rigid body that does not slip.
+"""The time of the first reversal of any rigid body that does not slip, a problem solved by Garcia and Hubbard (1988).
 
 To lowest order in rattle and spin, and averaged over the rattle, three quantities change: the spin n and the energies
 E_k of the two modes of rocking, all per unit mass.  With J = J33,
 
     J n' = -2 Σ σ_k E_k,   E_k' = 2 σ_k n E_k.
 
-These are Takano's (ndotab) and (abdot) without friction (2 σ_1 = k1 and 2 σ_2 = -k4 up to the order of the modes), and
-Garcia and Hubbard's equations as Kondo and Nakanishi (2017, arXiv:1704.06717) rederive them, with their asymmetric
-torque coefficients -2 σ_k.
+These are Takano's (ndotab) and (abdot) without friction: 2 σ_1 = k1 and 2 σ_2 = -k4, up to the order of the modes.
 
 The σ_k.  About the contact point the contact force has no torque, so that at n = 0 the spin changes by the term of
 second order in the motion of that point, with the height h of G and the radii of curvature R1 and R2,
@@ -22,8 +20,9 @@ inverse of the stiffness, which is diagonal.  These two sums give e1 e2 for each
 
 with the (M⁻¹)_12 = (1/M_1 - 1/M_2) sin(2 ξ)/2 of the moments of inertia M_1, M_2 of the two oscillations and the
 angle ξ between their axes and those of the curvature.  So it is a product of misalignment, difference of the inverse
-moments, difference of the radii and squared frequency, as Kondo and Nakanishi say of theirs; and the two σ are
-proportional to the squared frequencies, with opposite signs.
+moments, difference of the radii and squared frequency: the four factors that Kondo and Nakanishi (2017,
+arXiv:1704.06717, abstract) name for the formula of Garcia and Hubbard.  The two σ are proportional to the squared
+frequencies, with opposite signs.
 
 The time.  Where only the growing mode counts, (n - n_c)² + 2 E/J = N² is conserved, n_c being the spin at which the
 mode neither grows nor decays: zero without friction, the critical spin of (abdot) with it.  So
@@ -31,10 +30,8 @@ mode neither grows nor decays: zero without friction, the critical spin of (abdo
     n - n_c = N tanh(|σ| N (t_0 - t)),
     t_r = [asinh((n0 - n_c)/sqrt(2 E0/J)) + artanh(n_c/N)] / (|σ| N)
 
-for n0 > 0, and by reflection for n0 < 0.  With n_c = 0 this is Garcia and Hubbard's time, log((N + n0)/(N - n0)) over
-2 |σ| N.  This neglects the other mode, which decays, and all terms of higher order in n0/ν and in the rattle.
-
-Only the abstracts of the two papers were at hand, not their numbered equations: the derivation is ours.
+for n0 > 0, and by reflection for n0 < 0.  With n_c = 0 this is log((N + n0)/(N - n0)) over 2 |σ| N.  This neglects the
+other mode, which decays, and all terms of higher order in n0/ν and in the rattle.
 """
 
 from __future__ import annotations
