@@ -78,12 +78,7 @@ def test_a_whole_number_may_be_written_as_any_number(number: str, write: Write) 
 
 @pytest.mark.parametrize(
     "command",
-    [
-        "info quick.nc",
-        "run quick.yaml --output .",
-        "run quick.yaml --dry-run",
-        "run quick.yaml --output . --fresh 2>&1",
-    ],
+    ["info quick.nc", "run quick.yaml --dry-run", "run quick.yaml --output . --fresh 2>&1"],
 )
 def test_a_closed_pipe_ends_a_command_silently(command: str, tmp_path: Path) -> None:
     """As `… | head` does once it has what it wants; also one that shows its progress there."""
@@ -97,8 +92,7 @@ def test_a_closed_pipe_ends_a_command_silently(command: str, tmp_path: Path) -> 
         run, cwd=tmp_path, stdout=writing, stderr=writing if both else subprocess.PIPE, text=True, check=False
     )
     os.close(writing)
-    assert done.returncode == 141
-    assert [line for line in (done.stderr or "").splitlines() if "already complete" not in line] == []
+    assert (done.returncode, done.stderr or "") == (141, "")
 
 
 def test_a_command_reports_what_it_wrote(write: Write, tmp_path: Path) -> None:

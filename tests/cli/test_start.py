@@ -33,7 +33,7 @@ COMPLETED = {
     "run c.yaml --set integrator.t": "integrator.tolerance= integrator.t_end=",
     "run c.yaml --set friction.mu_":
         "friction.mu_static= friction.mu_viscous= friction.mu_rolling= friction.mu_spinning=",
-    "trajectory c.yaml --at d": "delta=",
+    "trajectory c.yaml --at d": "delta= density=",
     "run c.yaml --dry": "--dry-run",
     "traj": "trajectory",
 }  # fmt: skip

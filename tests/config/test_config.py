@@ -39,7 +39,7 @@ def test_defaults_are_the_papers_standard_case(write: Write) -> None:
         "x0": (0.01,), "y0": (0.01,),
     }  # fmt: skip
     assert (config.integrator.t_end, config.integrator.stop_early) == (1e6, 30_000)
-    assert config.measure == ("reversals", "energy_error", "margin", "resting_spin")
+    assert config.measure == ("reversals", "energy_error", "resting_spin", "margin")
 
 
 def test_fingerprint_sees_what_decides_the_numbers(write: Write) -> None:
