@@ -14,25 +14,14 @@ from sweep.cli.options import PATH
 from sweep.faults import brief, suggestion
 from sweep.parameters import PARAMETERS, Parameter
 
-MEASURED = {
-    "mass": "Mass, such as 30g.",
-    "density": "Density, such as 1.24g/cm3, instead of the mass.",
-    "length": "Length of the solid, such as 12.0+-0.1cm.",
-    "width": "Width of the solid.",
-    "height": "Height of the solid.",
-    "radius_long": "Radius of curvature along the body at its lowest point.",
-    "radius_short": "Radius of curvature across the body at its lowest point.",
-    "a": "Semi-axis of the surface along the body.",
-    "b": "Semi-axis of the surface across the body.",
-    "c": "Semi-axis of the surface, upright.",
-    "angle": "Angle from the surface's axes to the axes of inertia, such as 2deg [default: 0].",
-}
-"""The parameters that can be measured, with the help texts of their options."""
+_MEASURED = ("mass", "density", "length", "width", "height", "radius_long", "radius_short", "a", "b", "c", "angle")
+"""The parameters of solids that can be measured."""
 
 
 def _measured(command: Callable[..., None]) -> Callable[..., None]:
     """Add an option for each quantity that can be measured."""
-    for name, words in reversed(MEASURED.items()):
+    for name in reversed(_MEASURED):
+        words = f"{PARAMETERS[name].long_name.capitalize()}."
         command = click.option(f"--{name.replace('_', '-')}", metavar="NUMBER[+-ERROR]UNIT", help=words)(command)
     return command
 
@@ -45,10 +34,10 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
     """Print a configuration of a body with measured sizes.
 
     The body is a homogeneous solid, by default the lower half of an ellipsoid. Lengths may be in m, cm, mm, in or ft.
-    Give the mass, and for each direction a size, a radius of curvature or a semi-axis. If you give two, the size
+    Give the mass or the density, and for each direction a size, a radius of curvature or a semi-axis. If you give two, the size
     describes the solid and the other describes the surface. With --stl, give only the mass or the density.
 
-    A size without an error is uncertain by half of its last digit; write 36+-0mm if it is exact.
+    A size such as 36mm without an error is uncertain by half its last digit; write 36+-0mm if it is exact.
     """
     if stl and whole:
         refuse("--whole", "cannot be combined with --stl; leave out one of the two")
