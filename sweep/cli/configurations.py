@@ -34,8 +34,8 @@ def body(whole: bool, stl: Path | None, **texts: str | None) -> None:
     """Print a configuration of a body with measured sizes.
 
     The body is a homogeneous solid, by default the lower half of an ellipsoid. Lengths may be in m, cm, mm, in or ft.
-    Give the mass or the density, and for each direction a size, a radius of curvature or a semi-axis. If you give two, the size
-    describes the solid and the other describes the surface. With --stl, give only the mass or the density.
+    Give the mass or the density, and for each direction a size, a radius of curvature or a semi-axis. If you give two,
+    the size describes the solid and the other describes the surface. With --stl, give only the mass or the density.
 
     A size such as 36mm without an error is uncertain by half its last digit; write 36+-0mm if it is exact.
     """

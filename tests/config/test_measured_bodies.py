@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 import sweep
 from sweep.config import load_config
 from sweep.faults import InputError
+from sweep.plots import body
+from sweep.plots.trajectories import reversal_times
 
 SIZES = {"length": "12 cm", "width": "36 mm", "height": "16 mm", "mass": "52 g", "angle": "2 deg"}
 REST = {
@@ -93,9 +95,9 @@ def test_a_configuration_and_a_dataset_are_read_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again["spin"], straight["spin"])
 
 
-def columns(body: dict[str, object]) -> dict[str, float]:
+def columns(given_body: dict[str, object]) -> dict[str, float]:
     """The parameters of the models for a body."""
-    found = load_config({"body": body, **REST, "start": {"n0": 5, "x0": 0, "y0": 0}}).grid.columns()
+    found = load_config({"body": given_body, **REST, "start": {"n0": 5, "x0": 0, "y0": 0}}).grid.columns()
     return {name: float(values[0]) for name, values in found.items()}
 
 
@@ -169,6 +171,63 @@ def test_weights_of_equal_depth_leave_a_body_with_all_that_upright_spin_offers()
     config = load_config({"body": {"solid": "half_ellipsoid", **SIZES, "weights": pairs}, **REST})
     assert config.equations.name == "slip+coulomb+sigma+offset+gravity"
     assert load_config(config.document()) == config
+
+
+LOADED = {
+    "solid": "half_ellipsoid", "length": "12 cm", "width": "40 mm", "height": "16 mm",
+    "weights": [{"mass": "5 g", "at": at} for at in (["4 cm", "1 cm", "-2 mm"], ["-4 cm", "-1 cm", "-2 mm"])],
+}  # fmt: skip
+SLIPPING = {
+    "units": "SI", "friction": {"mu": 100}, "start": {"n0": 5, "x0": "1 mm", "y0": "0.3 mm"},
+    "integrator": {"t_end": 20},
+}  # fmt: skip
+
+
+def loaded(*masses: str) -> dict[str, object]:
+    """A scene whose axis is the mass of the solid without its weights."""
+    return {"body": {**LOADED, "mass": list(masses)}, **SLIPPING}
+
+
+def numbers(i: int, *masses: str) -> dict[str, object]:
+    """The same body without an axis, by the numbers that follow."""
+    found = load_config(loaded(*masses)).grid.columns()
+    return {"body": {name: float(found[name][i]) for name in NUMBERS}, **SLIPPING}
+
+
+def test_searches_take_the_mass_that_is_given_and_not_the_sum() -> None:
+    found = sweep.critical(loaded("52 g", "60 g"), bracket=0.1)
+    for i in range(2):
+        np.testing.assert_array_equal(
+            found["n_c2_bracket"][i], sweep.critical(numbers(i, "52 g", "60 g"), bracket=0.1)["n_c2_bracket"]
+        )
+
+
+@pytest.mark.parametrize("spins", [5, [4.99, 5]], ids=["along the mass", "over mass and spin"])
+def test_boundaries_lie_where_runs_with_the_given_mass_have_them(spins: float | list[float]) -> None:
+    scene = loaded("66 g", "70 g") | {"integrator": {"t_end": 200}}
+    found = sweep.boundaries({**scene, "start": {**SLIPPING["start"], "n0": spins}}, bracket=0.05, deviation=0.2)
+    assert "mass" in found["bracket"]
+    for i in range(found.sizes["point"]):
+        one, axis = found.isel(point=i), str(found["bracket"].values[i])
+        place = {name: float(one[name]) for name in ("mass", "n0")}
+        for side in ("fewer", "more"):
+            cell = sweep.run(scene, **place | {axis: float(one[f"end_{side}"])})
+            assert cell["reversals"] == one[f"reversals_{side}"]
+
+
+def test_cells_of_an_earlier_run_are_reused_by_the_mass_that_is_given(tmp_path: Path) -> None:
+    sweep.run(loaded("52 g"), output=tmp_path)
+    more = sweep.run(loaded("52 g", "60 g"), output=tmp_path)
+    assert more.attrs["taken_over"].startswith("1 of 2 cells are reused")
+    np.testing.assert_array_equal(more["spin_final"], sweep.run(loaded("52 g", "60 g"))["spin_final"])
+
+
+def test_a_trajectory_is_drawn_with_the_body_that_follows() -> None:
+    one, other = sweep.trajectory(loaded("52 g"), at={"mass": "52 g"}), sweep.trajectory(numbers(0, "52 g"))
+    np.testing.assert_array_equal(reversal_times(one), reversal_times(other))
+    assert len(reversal_times(one)) > 0
+    for name, values in vars(body.moving(one, np.array([0.0, 1.0]))).items():
+        np.testing.assert_array_equal(values, getattr(body.moving(other, np.array([0.0, 1.0])), name), name)
 
 
 WRONG = {
