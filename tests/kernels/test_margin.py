@@ -77,7 +77,7 @@ def test_nearly_round_bodies_do_not_settle_ahead_of_a_reversal(method: str) -> N
     rows = [i for i, b in enumerate(table["b"]) if b in (8.34943, 8.85002, 8.91708)]
     assert list(table["reversals"][rows]) == [2, 2, 2]
     cells = {name: table[name][rows] for name in ("b", "mu", "n0")}
-    ours = sweep.run({"cases": cells}, a=10.0, delta=0.03, x0=0.01, y0=0.01, method=method)
+    ours = sweep.run({"cases": cells}, a=10.0, delta=0.03, x0=0.01, y0=0.01, method=method, tolerance=1e-8)
     np.testing.assert_array_equal(ours["reversals"], 2)
     np.testing.assert_allclose(ours["t_last_reversal"], table["t_last_reversal"][rows], rtol=1e-3)
 

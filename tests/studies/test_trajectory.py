@@ -104,7 +104,7 @@ def test_trajectories_of_different_steps_are_sampled_at_the_same_times(write: Wr
 @pytest.mark.parametrize("n0", [-0.006, -0.015])
 def test_a_trajectory_goes_on_to_its_end_and_stays_where_a_sweep_says(n0: float, write: Write) -> None:
     """A sweep leaves both before t = 25; the rattle of the second grows later, and turns the spin."""
-    config = sweep.load_config(write(STANDARD), {"mu": 75.0, "n0": n0, "t_end": 8000.0})
+    config = sweep.load_config(write(STANDARD), {"mu": 75.0, "n0": n0, "t_end": 8000.0, "tolerance": 1e-8})
     swept, one = sweep.run(config), sweep.trajectory(config, every=20.0)
     assert float(swept.t_stop) < 25
     assert (float(one.t_stop), float(one.time[-1]), one.sizes["time"]) == (8000, pytest.approx(8000), 401)
