@@ -25,7 +25,7 @@ from sweep.parameters import PAPER_PARAMETERS
 # Most cells that a thread estimates at once.  A cell takes 0.1 ms; while the last ones finish, lanes are idle.
 _SOME = 512
 
-# Bodies whose stable ranges are found at once; a body of the slip model takes 11 µs, one of another model 0.1 ms.
+# Bodies whose stable ranges are found at once; a body of the slip model takes 13 µs, one of another model 0.1 ms.
 _PART = 4096
 
 

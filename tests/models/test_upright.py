@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import wide_bodies
+from support import columns, wide_bodies
 from support.physics import KANE_LEVINSON
 
 from sweep.models import MODELS, find
@@ -67,35 +67,27 @@ def test_the_ranges_are_those_of_the_matrices(name: str) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-2)
     slow = np.isfinite(expected) & (np.abs(expected) < 0.05 * model.spin_unit(body))
     assert slow.sum() > 500
-    np.testing.assert_allclose(found[slow], expected[slow], rtol=1e-6)
+    np.testing.assert_allclose(found[slow], expected[slow], rtol=5e-8)
     assert np.quantile(np.abs(found[slow] / expected[slow] - 1), 0.98) < 1e-10
 
 
-def test_at_the_ends_of_the_ranges_nearly_round_bodies_neither_grow_nor_decay() -> None:
-    """Their modes hardly differ, and the resultant alone would be off by 4e-7."""
-    body = wide_bodies(1000)
-    body["b"] = body["a"] * (1 - 1e-6)
-    for end in np.stack(stability.stable_ranges(SLIP, body))[:6]:
-        known = np.isfinite(end) & (np.abs(end) < 0.1)
-        theirs = {name: values[known] for name, values in body.items()}
-        growth = linear.growth_rate(SLIP, SLIP.constants.of(theirs), end[known])
-        np.testing.assert_allclose(growth / end[known], 0, atol=2e-8)
+@pytest.mark.parametrize("share", [1e-2, 1e-4, 1e-6])
+def test_bodies_whose_modes_hardly_differ_have_the_same_slow_ranges(share: float) -> None:
+    """Nearly round bodies, also very flat ones: there the resultant loses up to all of its digits."""
+    wide, flat = wide_bodies(200), np.geomspace(10.0, 3000.0, 200)
+    for body in (wide | {"b": wide["a"] * (1 - share)}, columns(a=flat, b=flat * (1 - share))):
+        found, expected = (
+            np.stack(stability.stable_ranges(model, body)[:2]) for model in (SLIP, replace(SLIP, characteristic=None))
+        )
+        slow = np.abs(expected) < 0.05
+        assert slow.sum() > 100
+        np.testing.assert_allclose(found[slow], expected[slow], rtol=5e-9)
 
 
 def test_no_bodies_have_no_rates() -> None:
     none = {name: values[:0] for name, values in wide_bodies(1).items()}
     assert linear.rates(SLIP, SLIP.constants.of(none), none["n0"]).shape == (0, 6)
     assert np.shape(stability.stable_ranges(SLIP, none)) == (7, 0)
-
-
-def test_a_rattle_decays_by_the_signs_of_all_growth_rates() -> None:
-    body = wide_bodies(1000)
-    constants = SLIP.constants.of(body)
-    for spin in spins(SLIP, body):
-        growth = np.linalg.eigvals(linear.jacobian(SLIP, constants, spin)).real.max(axis=1)
-        clear = np.abs(growth) > 1e-9
-        assert clear.sum() > 800
-        np.testing.assert_array_equal(stability._decays(SLIP, constants, spin)[clear], growth[clear] < 0)
 
 
 def test_polynomials_add_and_multiply_like_their_values() -> None:

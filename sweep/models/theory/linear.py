@@ -61,9 +61,10 @@ def rates(model: Model, constants, spin: Array) -> Array:
     return found
 
 
-# Newton's steps to the frequencies, the least share by which they are taken to differ at first, and the error relative
-# to each coefficient with which the roots have to reproduce the polynomial.
-_STEPS, _APART, _EXACT = 6, 0.02, 1e-12
+# Newton's steps to the frequencies, the least share by which they are taken to differ at first, and that by which they
+# have to differ in the end, and the error relative to each coefficient with which the roots have to reproduce the
+# polynomial.
+_STEPS, _APART, _ALIKE, _EXACT = 6, 0.02, 1e-3, 1e-12
 
 
 @np.errstate(all="ignore")
@@ -87,7 +88,8 @@ def _roots(polynomial: Array) -> tuple[Array, Array]:
     one, two, three = (Polynomial(np.stack([q[i], p[i], np.ones_like(half)])) for i in range(3))
     again = (one * two * three).coefficients[1:5]
     found = np.stack([*z, *z.conj(), -p[2] / 2 + root, -p[2] / 2 - root], axis=1)
-    return found, np.asarray((np.abs(again / c[1:5] - 1) < _EXACT).all(axis=0))
+    apart = np.abs(z[0] - z[1]) > _ALIKE * np.abs(z[0])
+    return found, np.asarray((np.abs(again / c[1:5] - 1) < _EXACT).all(axis=0) & apart)
 
 
 def growth_rate(model: Model, constants, spin: Array) -> Array:

@@ -91,11 +91,13 @@ def _isolated(coefficients: Array) -> Iterator[tuple[Array, Array, Array]]:
         for i in range(degree, k - 1, -1):
             bernstein[i] += bernstein[i - 1]
     low, width = np.zeros(len(cells)), 1.0
-    while len(cells):
+    while True:
         negative = np.signbit(bernstein)
         changes = (negative[1:] != negative[:-1]).sum(axis=0)
         yield cells[changes == 1], low[changes == 1], low[changes == 1] + width
         more = np.flatnonzero((changes > 1) & (width > _CLOSE))
+        if not len(more):
+            return
         cells, low, width, bernstein = np.tile(cells[more], 2), low[more], width / 2, bernstein[:, more]
         low, halves = np.concatenate([low, low + width]), np.empty((degree + 1, 2, len(more)))
         for k in range(degree + 1):
