@@ -153,7 +153,8 @@ def has_settled(states: Array, constants: Array) -> bool:
     spin, *_ = slip.MODEL.energy(states, p)
     within = MARGIN * reach(states, constants)
     near = spin + np.linspace(-1, 1, 5) * within
-    return bool(within < abs(spin) and (linear.growth_rate(slip.MODEL, p, near) < 0).all())
+    each = slip.MODEL.constants(*(np.full(len(near), value) for value in p))
+    return bool(within < abs(spin) and (linear.growth_rate(slip.MODEL, each, near) < 0).all())
 
 
 # --- while the rattle is tiny -----------------------------------------------------------------

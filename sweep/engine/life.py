@@ -206,9 +206,11 @@ def _of_count(run: Cells, errors: Errors) -> Array:
     """Return the factor by which errors have to fall for a count to be certain, shape (cells,).
 
     It is infinite where this is unknown: with another count, or a spin that cannot be predicted beyond the first leg.
+    At another time limit a parity says nothing, because the spin may be about to reverse.
     """
-    against, unpredicted = doubted_counts(run, errors), run.rules.first_leg is not None
-    another = against[Doubt.STEP] | against[Doubt.PARITY] | (unpredicted & (run.status == TIME_LIMIT))
+    against, limited = doubted_counts(run, errors), run.status == TIME_LIMIT
+    unpredicted = limited if run.rules.first_leg is not None else np.zeros(len(limited), bool)
+    another = against[Doubt.STEP] | (against[Doubt.PARITY] & ~limited) | unpredicted
     factor = np.where(against[Doubt.MARGIN], errors.of_margins / AIM, 0.0)
     return np.where(another | np.isnan(factor), np.inf, factor)
 

@@ -25,7 +25,7 @@ name: edge
 body: {b: [0.9, 3.0, 5.0], offset: [0.0, 0.3, 1.0]}
 friction: {mu: 60}
 start: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}
-integrator: {t_end: 300}
+integrator: {t_end: 300, tolerance: 1e-8}
 """
 """With b = 0.9 and offset = 0 the body falls over; with offset = 1 the centre of mass lies on the surface."""
 
