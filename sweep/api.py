@@ -338,6 +338,7 @@ def fit(
     laws: str | Sequence[str] = (),
     time_column: str = "",
     spin_column: str = "",
+    run: str = "",
     progress: bool | Callable[[float, str], None] | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
@@ -356,7 +357,9 @@ def fit(
         computed from a column "error" if there is one, otherwise from the residuals
     time_column, spin_column : names of the columns of the film, with a unit if it gives none, such as "omega (deg/s)";
         by default columns with known names
-    free : names of the parameters to find, including film_delay and film_bias of the film itself
+    run : the run, in a table of several: the end of the names of its columns, or the word in its column "run"
+    free : names of the parameters to find, including film_delay and film_bias of the film itself; the speed of a dry
+        law is free too unless `config` gives it
     laws : laws of friction to compare, such as ``["viscous", "coulomb"]``.  Each law takes its parameters from
         `config`; those that `config` does not give are also free. Parameters that a law does not have are ignored
 
@@ -377,7 +380,7 @@ def fit(
     from sweep.studies.laws import fitted
 
     with _prepared(config, overrides, progress) as (checked, reporter):
-        return fitted(checked, film, free, laws, reporter, (time_column, spin_column))
+        return fitted(checked, film, free, laws, reporter, (time_column, spin_column, run))
 
 
 def explore(dataset: xr.Dataset | str | Path, *, height: int = 950) -> Beside:

@@ -125,7 +125,7 @@ _SECTIONS: dict[str, tuple[_Row, ...]] = {
     "": (("gravity", u.ACCELERATION, "acceleration of free fall", 9.80665, _SIZE),),
     "friction": (
         ("mu", u.SLOWNESS, "friction μ", None, _VISCOUS, "Viscous friction coefficient."),
-        ("speed", u.SPEED, "slip speed of full friction", None, _SIZE,
+        ("speed", u.SPEED, "slip speed of full friction", 5e-3, _SIZE,
          "Slip speed above which Coulomb friction is fully developed."),
         ("mu_static", u.NUMBER, "coefficient of static friction", None, _COEFFICIENT),
         ("speed_stick", u.SPEED, "slip speed of static friction", None, _SIZE,

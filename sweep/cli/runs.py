@@ -191,11 +191,13 @@ def critical(config: Config, bracket: float, **how: Any) -> None:
 @click.option("--time-column", default="", metavar="NAME", help="Column of the time, e.g. 'clock (ms)'.")
 @click.option("--spin-column", default="", metavar="NAME",
               help="Column of the spin, gyroscope or heading, with its unit if the film has none.")  # fmt: skip
+@click.option("--run", default="", metavar="NAME",
+              help="Run in a table of several: the end of column names, or a word of its column 'run'.")  # fmt: skip
 @OUTPUT
 @QUIET
 def fit(
-    config: Config, film: Path, free: str, laws: str | None, time_column: str, spin_column: str, output: Path | None,
-    quiet: bool,
+    config: Config, film: Path, free: str, laws: str | None, time_column: str, spin_column: str, run: str,
+    output: Path | None, quiet: bool,
 ) -> None:  # fmt: skip
     """Find the parameters of the body in CONFIG that reproduce FILM.
 
@@ -214,7 +216,7 @@ def fit(
     names, others = ([name.strip() for name in each.split(",")] if each else [] for each in (free, laws))
     files = _files(config, "laws" if laws else "fit", output)
     with Terminal(quiet) as terminal:
-        result = fitted(config, film, names, others, terminal, (time_column, spin_column))
+        result = fitted(config, film, names, others, terminal, (time_column, spin_column, run))
     _save(result, files)
     with replacing(files.configuration) as temporary:
         temporary.write_text(result.attrs["config"], encoding="utf-8")

@@ -160,6 +160,10 @@ def unlike(config: Config, film: Film) -> str:
     gap = float(np.median(np.diff(film.time)))
     if film.clock == "" and config.units == SI and gap >= _SLOW:
         return f"has rows {gap:g} s apart if its times are in s; {given}"
+    turned = float(np.percentile(np.abs(np.diff(film.value)), 90)) if film.what == "heading" else 0.0
+    if turned > _TURNED:
+        words = f"turns by {turned:.2g} rad from row to row, too far to count turns"
+        return f"{words}; if its headings are in degrees, name the unit, such as 'heading (deg)'"
     spin = float(np.percentile(np.abs(film.value), 90)) if film.what != "heading" else 0.0
     if config.units == SI and config.of_rattlebacks and spin > _FAST:
         return f"turns at {spin:.3g} rad/s; if its spins are in degrees, name the unit, such as 'spin (deg/s)'"
@@ -168,6 +172,9 @@ def unlike(config: Config, film: Film) -> str:
 
 _SLOW = 1.0
 """Seconds between rows above which the unit of time must be named: such a film would not resolve the rattle."""
+
+_TURNED = 1.0
+"""Radians from row to row above which headings do not show the motion between them."""
 
 _FAST = 100.0
 """Radians per second, 16 turns, above which no body stays on a table."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
 
@@ -30,7 +30,10 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "gyroscope": ("(gyroscope|gyro rotation|(motion )?rotation rate|omega) z", "(gyro|gyr|ω) ?z", "[gw]z"),
     "heading": ("heading", "angle", "theta", "θ", "θr"),
     "error": ("error", "sigma", "uncertainty"),
+    **{f"{axis}{point}": (f"{axis} ?{point}",) for point in (1, 2) for axis in "xy"},
 }
+_POINTS = {"x1", "y1", "x2", "y2"}
+"""The columns of two points that a tracker follows: the direction from the first to the second is a heading."""
 
 # phyphox translates its column names, such as "Gyroskop Z" and "Żyroskop - składowa z"; units and the letter stay.
 _UPRIGHT = re.compile(r"(.*\W)?z")
@@ -67,13 +70,14 @@ class Film:
         return np.ones_like(self.time) if self.error is None else self.error
 
 
-def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film:
+def read(path: str | Path, time_column: str = "", spin_column: str = "", run: str = "") -> Film:
     """Read a film from a table with a header and columns separated by commas, semicolons or tabs.
 
     Parameters
     ----------
     time_column, spin_column : names of the time and data columns, with the unit in parentheses if the table gives none
         or a wrong one, such as "omega (deg/s)"; by default columns with known names are used
+    run : the run of a table of several: what the names of its columns end in, or the word in its column "run"
 
     Raises
     ------
@@ -81,25 +85,31 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
         if the file does not exist, or has no time or data column, an unknown unit, decreasing times, too few rows, or
         text instead of numbers.
     """
-    table = tables.read(str(path), text_of(local_path(path, "film", "a Film or the path of a table")))
+    table = _run(tables.read(str(path), text_of(local_path(path, "film", "a Film or the path of a table"))), run)
     found, asked = _columns(table), _asked(table, time_column, spin_column)
     if spin_column:
         found = {name: place for name, place in found.items() if name not in get_args(Seen)}
     found |= asked
-    what = next((each for each in get_args(Seen) if each in found), None)
+    what: Seen | None = next((each for each in get_args(Seen) if each in found), None)
+    if not what and found.keys() >= _POINTS:
+        what = "heading"
     if "time" not in found or not what:
-        names = either(f"'{name}'" for name in ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)"))
+        known = ("spin (rad/s)", "gyroscope z (rad/s)", "heading (deg)", "x1, y1, x2, y2")
+        names = either(f"'{name}'" for name in known)
         words = f"needs a column 'time (s)' and one {names}; it has {brief(', '.join(table.names))}"
         words += "" if len(table.names) > 1 else f", with no {either(SEPARATORS.values())} in the line"
         raise fault_of(words, file=str(path), line=table.top)
     if "error" in found and not table.units[found["error"]]:
-        table.units[found["error"]] = table.units[found[what]]
+        table.units[found["error"]] = table.units[found[what]] if what in found else ""
     gaps: dict[int, str] = {}
     units = {"time": TIME, "error": ANGLE if what == "heading" else SPIN}
     time, value, error = (
         _column(table, found[name], units.get(name, units["error"]), gaps) if name in found else None
         for name in ("time", what, "error")
     )
+    if what not in found:
+        x1, y1, x2, y2 = (_column(table, found[name], None, gaps) for name in sorted(_POINTS, key=lambda n: n[::-1]))
+        value = np.arctan2(y2 - y1, x2 - x1)
     assert time is not None
     assert value is not None
     whole = np.flatnonzero(np.isfinite(time) & np.isfinite(value))
@@ -120,6 +130,25 @@ def read(path: str | Path, time_column: str = "", spin_column: str = "") -> Film
         left_out=len(time) - len(kept), why=_why(len(time) - len(whole), gaps, len(whole), every),
         clock=table.units[found["time"]],
     )  # fmt: skip
+
+
+def _run(table: Table, run: str) -> Table:
+    """Return the part of a table that holds a run; raise an `InputError` if the run is not there or has to be named."""
+    column = next((i for i, name in enumerate(table.names) if name.casefold() == "run"), None)
+    runs = [] if column is None else [*dict.fromkeys(row[column] for row in table.rows)]
+    if run in runs:
+        kept = [i for i, row in enumerate(table.rows) if row[column or 0] == run]
+        return replace(table, lines=[table.lines[i] for i in kept], rows=[table.rows[i] for i in kept])
+    clocks = _NAMES["time"]  # one clock may serve all runs
+    places = [i for i, name in enumerate(table.names) if name.endswith(run) or name.casefold() in clocks]
+    if (run and not any(table.names[i].endswith(run) for i in places)) or (not run and len(runs) > 1):
+        words = f"there is no run {brief(run)}{suggestion(run, runs)}" if run else "has several runs; name one"
+        raise fault_of(f"{words}; it has {brief(', '.join(runs or table.names))}", "--run", file=table.file)
+    if not run:
+        return table
+    names = [table.names[i].removesuffix(run).strip() for i in places]
+    rows = [[row[i] for i in places] for row in table.rows]
+    return replace(table, names=names, units=[table.units[i] for i in places], rows=rows)
 
 
 def _columns(table: Table) -> dict[str, int]:
@@ -173,12 +202,14 @@ def _plain(name: str) -> str:
     return re.sub(r" run #\d+$", "", spaced)
 
 
-def _column(table: Table, place: int, unit: Unit, gaps: dict[int, str]) -> Array:
+def _column(table: Table, place: int, unit: Unit | None, gaps: dict[int, str]) -> Array:
     """Return a column in SI, with NaN for cells without a number, which are noted in `gaps` by row; shape (rows,).
+
+    Without a `unit`, it stays in the unit of the table.
 
     If a spelling of numbers is not understood, half of the motion could be lost, such as all negative values.
     """
-    scale, cells = table.scale(place, unit), table.numbers(place)
+    scale, cells = table.scale(place, unit) if unit else 1.0, table.numbers(place)
     texts = {row: cell for row, cell in enumerate(cells) if isinstance(cell, str)}
     gaps |= texts
     odd = [row for row, cell in texts.items() if cell.lower() not in GAPS]

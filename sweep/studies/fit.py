@@ -1,37 +1,26 @@
-"""Finds the body, friction and start that reproduce a film.
-
-The misfit has many minima: a trajectory with one more reversal is a different minimum. The search therefore starts from
-points all over the ranges (Sobol), and fits the beginning of the film first, then half as much again, and so on. If the
-curve that it finds does not fit, the search is repeated from more points.
-"""
+"""Finds the body, friction and start that reproduce a film, with intervals and a verdict."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from math import ceil
 
 import numpy as np
 import xarray as xr
-from scipy.stats import qmc
 
 from sweep.config import Config, Values
-from sweep.config.cross_checks import misplaced, unlike
 from sweep.config.film import Film
-from sweep.faults import brief, counted, fault_of, suggestion
-from sweep.grid import BODY, Array
+from sweep.grid import Array
 from sweep.interrupt import deferred
 from sweep.models.user.blame import blamed
 from sweep.results import dataset
 from sweep.results.kind import FIT
 from sweep.results.provenance import provenance
-from sweep.studies import ranges, verdict
-from sweep.studies.concurrent import run_concurrently
+from sweep.studies import search, verdict
+from sweep.studies.changes import advised
 from sweep.studies.intervals import LEVELS, blind, covariance, intervals, variance
-from sweep.studies.misfit import ENOUGH, UNKNOWNS, Minimum, Note, Problem, minimise
-from sweep.studies.study import require_simulated
+from sweep.studies.misfit import UNKNOWNS, Minimum, Note, Problem
 from sweep.units import ANGLE, SPIN, TIME
 from sweep.variables import Variable
 
@@ -42,28 +31,6 @@ _SEEN = {
     "heading": Variable("float64", ANGLE, "heading"),
 }
 
-SEARCHES = ((256, 6), (1024, 8))
-"""Numbers of points all over the ranges and of best points to continue from; more if the first search finds no fit."""
-
-# Minima whose parameters differ by less than this share of their ranges are merged.
-_SAME = 0.01
-
-# Factor by which the part of the film that the search sees grows each time, beginning with its first twelfth. Of the
-# films of turning bodies that were fitted from one reversal to the next, three were missed; doubling missed two, and
-# 1.3 was no better than 1.5.
-_LONGER, _HORIZONS = 1.5, 7
-
-# Accuracy of minima over a part of the film.
-_ROUGHLY = 1e-5
-
-# Number of times outliers are sought and ranges widened: where the misfit would fall by half a variance within another
-# tenth of the range.
-_ROUNDS, _WIDENED = 4, (0.1, 0.5)
-
-_MOST_STEPS = 1e6
-"""Largest median number of steps per trajectory. Random films take 3,000 to 30,000, and a million or more if degrees
-are taken for radians."""
-
 _OPTIONAL = ("sigma",)
 """Parameters that every law has, and that are zero unless a configuration names them."""
 
@@ -73,50 +40,23 @@ _RUGGED = "the misfit is rugged: minima lie close together, and the intervals be
 @deferred()
 def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared: bool = False) -> xr.Dataset:
     """Fit the law of friction that `config` names, which may be one of several that are `compared`."""
-    if not np.isfinite([film.time, film.value, film.errors]).all():
-        raise fault_of("holds a value that is not a number; leave out that instant", "film")
-    theirs, known = ranges.of_film(film), config.distributions
-    config = _one_body(config, free, theirs)
-    if reason := unlike(config, film):
-        raise fault_of(reason, "film")
-    began = time.perf_counter()
+    began, posed = time.perf_counter(), search.posed(config, film, free)
     if film.omitted:
         note(film.omitted)
-    if known:
-        note(f"free within the measured distribution: {', '.join(known)}")
-    sought = {
-        name: theirs.get(name) or (ranges.measured(config.table[name], known[name]) if name in known
-                                   else ranges.of_parameter(config, film, name))
-        for name in dict.fromkeys([*free, *known])
-    }  # fmt: skip
-    if len(sought) >= len(film.time):
-        raise fault_of(f"{len(sought)} parameters, and the film has {len(film.time)} rows; free fewer", "free")
-    ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
-    if off := misplaced(replace(config, parameters=config.parameters | ends)):
-        raise config.error("x0", f"the range of a free parameter is too wide: {off}")
+    if config.distributions:
+        note(f"free within the measured distribution: {', '.join(config.distributions)}")
     with blamed(config.origin):
-        problem = Problem(config, film, sought, _countable(film))
-        _check_length(problem)
-        problem, minima = _found(problem, note)
+        search.check_length(posed)
+        problem, minima = search.found(posed, note)
         found, limits, rugged = intervals(problem, minima, note)
-        (best,) = _turned(problem, [found])
+        (best,) = search.turned(problem, [found])
         if best is not found:
             at = problem.mirrored
             limits[..., at] = 1 - limits[:, ::-1][..., at]
+        judged = verdict.judged(problem, best)
+        advice = "" if judged.fits else advised(config, posed, free, problem, best, note, compared=compared)
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
-    return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, compared=compared)
-
-
-def _check_length(problem: Problem) -> None:
-    """Raise an `InputError` if a fit would take hours, as it does for a film whose unit is wrong."""
-    film, places = problem.film, qmc.Sobol(len(problem.free), rng=0).random(64)
-    usual = float(np.median(film.time[-1] / problem.steps(places)))
-    if usual > _MOST_STEPS:
-        raise fault_of(
-            f"a trajectory over it takes {float(f'{usual:.1g}'):,.0f} steps, and a fit needs thousands of "
-            f"trajectories; check the units of the film, which shows up to {np.abs(film.value).max():.3g} and lasts "
-            f"{film.time[-1]:.3g}, and those of the body", "film",
-        )  # fmt: skip
+    return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, judged, advice)
 
 
 def with_optional(config: Config, free: Sequence[str]) -> Config:
@@ -126,122 +66,16 @@ def with_optional(config: Config, free: Sequence[str]) -> Config:
     return replace(config, parameters=config.parameters | zero) if zero and config.of_rattlebacks else config
 
 
-def _countable(film: Film) -> Array:
-    """Return the instants that count before anything is known."""
-    return np.ones(len(film.time), bool) if film.what == "heading" else verdict.gross(film.value)
-
-
-def _one_body(config: Config, free: Sequence[str], of_film: Collection[str]) -> Config:
-    """Return `config` if it describes one body, apart from the `free` parameters; raise an `InputError` otherwise.
-
-    `of_film` holds the names of the free parameters of the film itself.
-    """
-    require_simulated(config)
-    config = config.at_medians
-    known = (*config.tier.parameters, *of_film)
-    if not free:
-        raise fault_of(f"name at least one parameter, out of {', '.join(known)}", "free")
-    for name in free:
-        if name not in known:
-            message = f"{brief(name)} is not a parameter of the {config.tier.name} model{suggestion(name, known)}"
-            raise fault_of(f"{message}; these can be free: {', '.join(known)}", "free")
-    if config.cases:
-        raise config.error(("cases",), "cannot be fitted; a fit takes a single body")
-    if more := [name for name in config.axes if name not in free]:
-        raise config.error(more[0], "has several values; make it free, or give one value")
-    return config
-
-
-def _found(problem: Problem, note: Note) -> tuple[Problem, list[Minimum]]:
-    """Return the minima over the whole film, lowest first, and the problem with the final ranges and outliers."""
-    found: list[tuple[Problem, list[Minimum]]] = []
-    for seed, (points, kept) in enumerate(SEARCHES):
-        settled, minima = _settled(problem, _search(problem, points, kept, seed, note), note)
-        found.append((settled, minima))
-        # A wider range may have led into a corner far from the minimum.
-        if settled.free == problem.free and verdict.judged(settled, minima[0]).fits:
-            break
-    problem, minima = min(found, key=lambda each: each[1][0].misfit)
-    return problem, _different(_turned(problem, minima))
-
-
-def _turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
-    """Turn minima by half a turn where that changes nothing: the best to the configured start, the others to it."""
-    if not (at := problem.mirrored):
-        return minima
-    toward = np.full(2, 0.5)
-    toward[0] += problem.config.parameters[list(problem.free)[at[0]]].numbers[0] or 1.0
-    turned: list[Minimum] = []
-    for each in minima:
-        if (each.place[at] - 0.5) @ (toward - 0.5) < 0:
-            place, jacobian = each.place.copy(), each.jacobian.copy()
-            place[at], jacobian[:, at] = 1 - place[at], -jacobian[:, at]
-            each = each._replace(place=place, jacobian=jacobian)
-        turned.append(each)
-        toward = turned[0].place[at]
-    return turned
-
-
-def _search(problem: Problem, points: int, kept: int, seed: int, note: Note) -> list[Minimum]:
-    """Return minima over the whole film, lowest first."""
-    sobol = qmc.Sobol(len(problem.free), rng=seed).random(points)
-    rows = len(problem.film.time)
-    horizons = [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
-    cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
-    places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:kept]]]
-    for number, instants in enumerate(horizons, start=1):
-        minima = _minimised(problem, places, instants, ENOUGH if instants == rows else _ROUGHLY)
-        note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
-        places = [each.place for each in minima]
-    return minima
-
-
-def _minimised(
-    problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = ENOUGH
-) -> list[Minimum]:
-    """Return the minima near these places, lowest first, over the film or its first instants."""
-    answers = partial(problem.answers, instants=instants)
-    return _different(run_concurrently([partial(minimise, place=place, enough=enough) for place in places], answers))
-
-
-def _settled(problem: Problem, minima: list[Minimum], note: Note) -> tuple[Problem, list[Minimum]]:
-    """Return the minima after leaving out outliers and widening ranges at whose ends the best minimum lies."""
-    for _ in range(_ROUNDS):
-        best = minima[0]
-        kept = verdict.outliers(problem, best)
-        sides = verdict.pressed(problem, best, *_WIDENED)
-        free = {name: r.widened(up=sides[name] > 0) if name in sides else r for name, r in problem.free.items()}
-        scale = np.sqrt(variance(problem, best))
-        if free == problem.free and (kept == problem.kept).all() and (scale == problem.scale or not problem.measured):
-            break
-        if (off := int((~kept).sum())) and (kept != problem.kept).any():
-            note(f"{counted(off, 'outlier')} left out")
-        if wider := [name for name in free if free[name] != problem.free[name]]:
-            note(f"wider ranges: {', '.join(wider)}")
-        new = replace(problem, free=free, kept=kept, scale=scale, _steps={})
-        minima = _minimised(new, [new.place(problem.values(each.place)) for each in minima])
-        problem = new
-    return problem, minima
-
-
-def _different(minima: list[Minimum]) -> list[Minimum]:
-    """Return the distinct minima, lowest first."""
-    found: list[Minimum] = []
-    for each in sorted(minima, key=lambda each: each.misfit):
-        if all(np.max(np.abs(each.place - other.place)) > _SAME for other in found):
-            found.append(each)
-    return found
-
-
 def _labelled(
-    problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float, *, compared: bool
-) -> xr.Dataset:
+    problem: Problem, minima: list[Minimum], limits: Array, words: list[str], seconds: float,
+    judged: verdict.Verdict, advice: str,
+) -> xr.Dataset:  # fmt: skip
     """Return the dataset of the result, with the film and the fitted curve."""
     best, film, names = minima[0], problem.film, list(problem.free)
     spread, unit = covariance(problem, best), variance(problem, best)
     deviation, rows = np.sqrt(np.diag(spread)), problem.rows
     fitted = film.value + verdict.of_film(problem, best) * film.errors
-    judged, edge = verdict.judged(problem, best), _ends(problem, limits)
+    edge = _ends(problem, limits)
     shown, clock = (dataset.described(each, problem.config.units) for each in (_SEEN[film.what], _TIME))
     ends = {
         f"{side}_{level}": ("parameter", problem.values(place), {"long_name": f"{side} end, {level} % confidence"})
@@ -279,7 +113,7 @@ def _labelled(
         fits=int(judged.fits), fits_because=judged.because,
         verdict=verdict.sentences(problem, judged, problem.values(best.place),
                                   np.array([problem.values(end) for end in limits[-1]]), edge, words,
-                                  compared=compared),
+                                  advice),
         undetermined="; ".join(words), trajectories=problem.trajectories,
     )  # fmt: skip
 

@@ -3,7 +3,8 @@
 An interval reaches from the least to the largest value of a parameter at which the other parameters can keep the
 misfit, in units of the variance, within 1 or 3.84 of its minimum (profile likelihood: Raue et al. 2009, doi
 10.1093/bioinformatics/btp358).  The misfit may have several valleys: a coarse scan of every parameter finds them, and
-each side is then followed outwards from the outermost of them.
+each side is then followed outwards from the outermost of them.  The parameters that were measured vary in all profiles;
+their own intervals are those of the linear theory, since a measurement leaves little room for more.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _WIDE, _NARROW = np.linspace(0.08, 0.92, 6), np.array([-3.0, -1.5, 1.5, 3.0])
 _ACCURACIES, _HIGH = (1e-2, 1e-5), 100.0
 
 # Fall of the misfit, in units of the variance, with which a minimum is lower than the best.
-_LOWER = 0.01
+_LOWER = 0.05
 
 # Accuracy of a profile, in units of the variance.
 _ENOUGH = 3e-3
@@ -83,7 +84,7 @@ def _profiles(
     problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Note, *, stops: bool
 ) -> tuple[Array, Minimum | None]:
     """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
-    unit, parameters = variance(problem, best), range(len(problem.free))
+    unit, parameters = variance(problem, best), problem.unknown
     valleys = [*minima, *_scanned(problem, best)]
     lower = min(valleys, key=lambda each: each.misfit)
     if stops and lower.misfit < best.misfit - _LOWER * unit:
@@ -98,7 +99,11 @@ def _profiles(
     lowest = min((side.lower for side in found if side.lower), key=lambda each: each.misfit, default=None)
     if lowest and stops:
         return np.empty(0), lowest
-    low, high = np.reshape([side.ends for side in found], (2, len(problem.free), len(LEVELS))).transpose(0, 2, 1)
+    deviations = np.sqrt(np.outer([*LEVELS.values()], np.diag(covariance(problem, best))))
+    low, high = np.clip([best.place - deviations, best.place + deviations], 0, 1)
+    low[:, parameters], high[:, parameters] = np.reshape(
+        [side.ends for side in found], (2, len(parameters), len(LEVELS))
+    ).transpose(0, 2, 1)
     known += [(_on_side(problem, place, best), rise) for side in found for place, rise in side.valley]
     places, above = np.stack([place for place, _ in known]), np.array([rise for _, rise in known])
     for level, allowed in enumerate(LEVELS.values()):
@@ -119,7 +124,7 @@ def _on_side(problem: Problem, place: Array, best: Minimum) -> Array:
 def _scanned(problem: Problem, best: Minimum) -> list[Minimum]:
     """Return minima, most of them with one parameter fixed, in valleys that walls of the misfit hide from a profile."""
     deviation, searches = np.sqrt(np.diag(covariance(problem, best))), list[tuple[int, Array]]()
-    for i in range(len(problem.free)):
+    for i in problem.unknown:
         for end in np.clip([*_WIDE, *(best.place[i] + _NARROW * deviation[i])], 0, 1):
             searches.append((i, np.where(np.arange(len(problem.free)) == i, end, best.place)))
     found, unit = list[Minimum](), variance(problem, best)
@@ -193,13 +198,16 @@ def covariance(problem: Problem, best: Minimum) -> Array:
 
 
 def blind(problem: Problem, best: Minimum) -> list[str]:
-    """Describe what the film does not determine."""
+    """Describe what the film does not determine, apart from parameters that were measured."""
     spread, names = covariance(problem, best), list(problem.free)
+    sought = [names[i] for i in problem.unknown]
     sizes, directions = np.linalg.eigh(spread)
     sentences = []
     for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
         if 4 * np.sqrt(size) > _BLIND:
-            some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
+            some = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3 and name in sought]
+            if not some:
+                continue
             parameters = " and ".join(some) + (" together" if len(some) > 1 else "")
             words = "the 95 % interval covers half of the range or more"
             sentences.append(f"the film hardly determines {parameters}: {words}")

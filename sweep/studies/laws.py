@@ -7,20 +7,20 @@ criterion over the smallest (Burnham and Anderson 2002, sections 2.6 and 2.9).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import prod, sqrt
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from sweep.config import Config, load_config
+from sweep.config import Config
 from sweep.config.film import Film, read
 from sweep.engine.reporter import Reporter
 from sweep.faults import brief, fault_of, refusal, suggestion
-from sweep.models.general.laws import LAWS, Law
+from sweep.models.general.laws import LAWS
+from sweep.studies.changes import left_open, with_law
 from sweep.studies.fit import fit, with_optional
-from sweep.studies.ranges import wide
 
 # Differences of the criterion up to which two laws cannot be distinguished, and above which one is ruled out. A useless
 # parameter makes a difference of two.
@@ -39,9 +39,9 @@ def fitted(
     free: str | Sequence[str],
     laws: str | Sequence[str],
     reporter: Reporter,
-    columns: tuple[str, str] = ("", ""),
+    columns: tuple[str, str, str] = ("", "", ""),
 ) -> xr.Dataset:
-    """Fit as `sweep.api.fit`; `columns` names the time and data columns."""
+    """Fit as `sweep.api.fit`; `columns` names the time and data columns and the run."""
     free, laws = _names(free, "free"), _names(laws, "laws")
     if laws and (config.origin or config.model != "slip"):
         raise fault_of("can be compared only in the slip model; set model: slip", "laws")
@@ -50,12 +50,13 @@ def fitted(
             words = f"{brief(name)} is not a law of friction{suggestion(name, LAWS)}"
             raise fault_of(f"{words}; choose from {', '.join(LAWS)}", "laws")
     film, note = film if isinstance(film, Film) else read(film, *columns), reporter.note
+    free = [*dict.fromkeys([*free, *left_open(config)])]
     config = with_optional(config, free)
     if not laws:
         return fit(config, film, free, note)
     found: dict[str, xr.Dataset] = {}
     for name in dict.fromkeys(laws):
-        other, own = _with_law(config, LAWS[name])
+        other, own = with_law(config, LAWS[name])
         theirs = [each for each in free if each in other.tier.parameters or each not in config.table]
         dropped, names = [each for each in free if each not in theirs], list(dict.fromkeys([*theirs, *own]))
         note(f"law {name}: free are {', '.join(names)}" + (f"; it has no {', '.join(dropped)}" if dropped else ""))
@@ -69,23 +70,6 @@ def _names(given: str | Sequence[str], argument: str) -> Sequence[str]:
     if not (isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)):
         raise fault_of(refusal(given, "a name or a list of names"), argument)
     return names
-
-
-def _with_law(config: Config, law: Law) -> tuple[Config, list[str]]:
-    """Return `config` with another law, and the parameters of the law that it does not give, which are free.
-
-    A coefficient of dry friction says nothing about a viscous one, and vice versa.
-    """
-    document, before = config.document(), LAWS[config.law]
-    kept = {key: document[key] for key in document if key not in ("integrator", "measure")}
-    owned = {name for each in LAWS.values() for name in each.parameters}
-    given = document.get("friction", {})
-    friction = {name: value for name, value in given.items() if name not in {*owned, "law"}} | {"law": law.name}
-    said = [name for name in law.parameters if name in given and (name in law.pure) == (name in before.pure)]
-    friction |= {name: given[name] for name in said}
-    own = [name for name in law.parameters if name not in said and config.table[name].default is None]
-    friction |= {name: sqrt(prod(wide(config, law)[name])) for name in own}
-    return load_config({**kept, "friction": friction, "integrator": {"t_end": config.integrator.t_end}}), own
 
 
 def _together(found: Mapping[str, xr.Dataset], film: Film) -> xr.Dataset:

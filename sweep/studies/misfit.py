@@ -1,6 +1,6 @@
 """Computes how far trajectories are from a film, the sum of squares of (computed - seen) / error, and its minima.
 
-SciPy minimises from several places in parallel. A trajectory and its neighbours on both sides, which give the columns
+Minima are sought from several places in parallel. A trajectory and its neighbours on both sides, which give the columns
 of the Jacobian, take the same steps: the misfit is then as smooth as the motion, whereas adaptive steps would create
 spurious minima (Creswell et al. 2024, doi 10.1098/rsif.2023.0369).
 """
@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from sweep.config import Config
 from sweep.config.film import Film
@@ -39,7 +38,10 @@ _LOST = 10.0
 ENOUGH = 1e-9
 """Relative accuracy of the misfit and the place of a minimum."""
 
-_FLAT, _MOST_STEPS = 1e-14, 50
+_MOST_STEPS, _FLAT = 50, 1e-14
+
+# Damping of the first step, its limits, the factors tried at once, and the share of a step that shows its bend.
+_DAMPING, _LEAST_DAMPING, _MOST_DAMPING, _FACTORS, _PROBE = 1e-3, 1e-9, 1e6, (0.1, 1.0, 10.0), 0.1
 
 
 class Minimum(NamedTuple):
@@ -91,6 +93,11 @@ class Problem:
     def measured(self) -> list[int]:
         """Indices of the parameters that were measured independently."""
         return [i for i, each in enumerate(self.free.values()) if each.prior]
+
+    @property
+    def unknown(self) -> list[int]:
+        """Indices of the other parameters."""
+        return [i for i in range(len(self.free)) if i not in self.measured]
 
     @property
     def mirrored(self) -> list[int]:
@@ -178,31 +185,49 @@ class Problem:
 def minimise(ask: Ask, place: Array, fixed: int | None = None, enough: float = ENOUGH) -> Minimum:
     """Find the minimum near a place, over all parameters except the `fixed` one.
 
-    The search ends when a step changes misfit or place by less than the share `enough`, or the slope vanishes.
+    The search ends when a step changes the misfit by less than the share `enough`.  It is Levenberg and Marquardt's,
+    and its steps bend as valleys do (geodesic acceleration: Transtrum and Sethna 2012, arXiv:1201.5885).
     """
-    moved = np.array([i for i in range(len(place)) if i != fixed], int)
-    known: dict[bytes, tuple[Array, Array]] = {}
+    here, damping, size = place.copy(), _DAMPING, np.zeros(len(place))
+    away, jacobian = _look(ask, here)
+    for _ in range(_MOST_STEPS):
+        misfit, slope = away @ away, jacobian.T @ away
+        closed = ((here <= 0) & (slope > 0)) | ((here >= 1) & (slope < 0))
+        moved = np.flatnonzero(~closed & (np.arange(len(place)) != fixed))
+        columns, size = jacobian[:, moved], np.maximum(size, np.linalg.norm(jacobian, axis=0))
+        factors = damping * np.array(_FACTORS)
+        scaled = factors[:, None, None] * np.diag(np.maximum(size[moved], _FLAT) ** 2)
+        inverse = np.linalg.inv(columns.T @ columns + scaled) @ columns.T
+        straight = -inverse @ away
+        if not len(moved) or np.max(-straight @ slope[moved]) < enough * misfit / 2:
+            break
+        probed = ask(_moved(here, moved, np.concatenate([0 * straight[:1], _PROBE * straight])))
+        second = 2 / _PROBE**2 * (probed[1:] - probed[0] - _PROBE * straight @ columns.T)
+        bent = -np.einsum("kij,kj->ki", inverse, second) / 2
+        bent[2 * np.linalg.norm(bent * size[moved], axis=1) > np.linalg.norm(straight * size[moved], axis=1)] = 0
+        tried = _moved(here, moved, straight + bent)
+        misfits = np.sum(ask(tried) ** 2, axis=1)
+        best = int(np.argmin(misfits))
+        if misfits[best] < misfit:
+            here, damping = tried[best], max(factors[best], _LEAST_DAMPING)
+            away, jacobian = _look(ask, here)
+        else:
+            damping = factors[-1] * _FACTORS[-1]
+        if misfits[best] < misfit < misfits[best] * (1 + enough) or damping > _MOST_DAMPING:
+            break
+    return Minimum(here, float(away @ away), jacobian, away)
 
-    def look(some: Array) -> tuple[Array, Array]:
-        if (key := some.tobytes()) not in known:
-            known.clear()
-            at = place.copy()
-            at[moved] = some
-            steps = _NEAR * np.eye(len(place))
-            found = ask(np.concatenate([at[None], at + steps, at - steps]))
-            ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
-            known[key] = found[0], (ahead - behind).T / (2 * _NEAR)
-        return known[key]
 
-    if not len(moved):
-        away, jacobian = look(place[moved])
-        return Minimum(place, float(np.sum(away**2)), jacobian, away)
-    inside = np.clip(place[moved], 1e-9, 1 - 1e-9)
-    found = least_squares(
-        lambda some: look(some)[0], inside, lambda some: look(some)[1][:, moved], bounds=(0, 1), x_scale="jac",
-        max_nfev=_MOST_STEPS, ftol=enough, xtol=enough, gtol=_FLAT,
-    )  # fmt: skip
-    end = place.copy()
-    end[moved] = found.x
-    away, jacobian = look(found.x)
-    return Minimum(end, float(2 * found.cost), jacobian, away)
+def _look(ask: Ask, place: Array) -> tuple[Array, Array]:
+    """Return the residuals at a place and their Jacobian."""
+    steps = _NEAR * np.eye(len(place))
+    found = ask(np.concatenate([place[None], place + steps, place - steps]))
+    ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
+    return found[0], (ahead - behind).T / (2 * _NEAR)
+
+
+def _moved(place: Array, moved: Array, steps: Array) -> Array:
+    """Return a place with some of its parameters `moved` by several steps, within the ranges."""
+    found = np.tile(place, (len(steps), 1))
+    found[:, moved] += steps
+    return np.asarray(np.clip(found, 0, 1))

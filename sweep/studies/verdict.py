@@ -19,7 +19,6 @@ from sweep.faults import counted, either
 from sweep.grid import BODY, Array
 from sweep.studies.intervals import variance
 from sweep.studies.misfit import UNKNOWNS, Minimum, Problem
-from sweep.studies.ranges import of_film as ranges_of_film
 from sweep.units import ANGLE, SPIN, TIME, named, pretty
 
 # The probability that one of the tests rejects a correct curve, and the lags of the autocorrelation.
@@ -147,31 +146,21 @@ def pressed(problem: Problem, best: Minimum, share: float = _BEYOND, fall: float
 
 
 def sentences(
-    problem: Problem, verdict: Verdict, values: Array, limits: Array, edge: Array, words: list[str], *, compared: bool
+    problem: Problem, verdict: Verdict, values: Array, limits: Array, edge: Array, words: list[str], advice: str
 ) -> str:
     """Return three sentences: how well the curve fits, what is known how accurately, and which film would show more.
 
     `limits` holds the ends of the 95 % intervals, shape (2, free); `edge` marks ends that are limits of the search;
-    `compared` says whether laws of friction were compared.
+    `advice` is the second sentence of a fit that cannot be trusted.
     """
     config, names = problem.config, list(problem.free)
     unit = pretty(named(ANGLE if problem.film.what == "heading" else SPIN, config.units))
     return "\n".join([
         _how(problem, verdict, unit),
-        _known(config, names, values, limits, edge) if verdict.fits else _causes(problem, compared),
+        _known(config, names, values, limits, edge) if verdict.fits else advice,
         _unknown([name for name, each in zip(names, edge, strict=True) if each], words) if verdict.fits
         else "The values and intervals below describe a curve that does not match the film.",
     ])  # fmt: skip
-
-
-def _causes(problem: Problem, compared: bool) -> str:
-    """Say what to check where the curve does not fit the film."""
-    words = "Check the units of the film and the dimensions of the body"
-    if untried := [name for name in ranges_of_film(problem.film) if name not in problem.free]:
-        words += f"; try {_all(untried)} as free parameter{'s' * (len(untried) > 1)}"
-    if problem.config.model == "slip" and not (compared or problem.config.origin):
-        words += "; compare laws of friction with --laws, because this fit tried one law only"
-    return f"{words}."
 
 
 def _how(problem: Problem, verdict: Verdict, unit: str) -> str:

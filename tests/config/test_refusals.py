@@ -110,7 +110,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("units: SI", "units: paper"), (" mass: 1.0,", "")), 3, "gravity", "is 1 in the paper's units"),
     (stone(("coulomb", "coulumb")), 5, "friction.law", "did you mean coulomb?"),
     (stone(("law: coulomb, ", "law: viscous, ")), 5, "friction.speed", "does not belong to the law viscous"),
-    (stone((" speed: 1.0e-3,", "")), 5, "friction.speed", "missing"),
+    (stone((" mu: 0.5,", "")), 5, "friction.mu", "missing"),
     (stone(("slip1: 0,", "n0: 1,")), 6, "start.n0", "with omega1, omega2, omega3, pitch, roll, slip2; give either n0, x0, y0 or angles"),
     (stone(("roll: 0.5 deg", "roll: 91 deg")), 6, "start.roll", "< 1.5708, not 1.588"),
     (stone(("{a: 0.2", "{surface: paraboloid, delta: 0, a: 0.01"), (MOMENTS, "")), 4, "body.delta", "has no meaning with surface: paraboloid; give the elements of inertia instead"),

@@ -100,6 +100,12 @@ def test_degrees_taken_for_radians_are_refused(write: Write) -> None:
         sweep.fit(write(STONE), path, ["mu"])
 
 
+def test_headings_in_degrees_without_their_unit_are_refused(write: Write) -> None:
+    path = write(table("t (s),angle", TIMES, (300 * TIMES + 100 * SPINS) % 360), "film.csv")
+    with pytest.raises(InputError, match=r"film: turns by \S+ rad from row to row, .* such as 'heading \(deg\)'"):
+        sweep.fit(write(STONE), path, ["mu"])
+
+
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 def test_a_film_may_come_from_a_spreadsheet(tmp_path: Path, encoding: str) -> None:
     (tmp_path / "film.txt").write_text(table("t\tn", TIMES, SPINS, mark="\t"), encoding=encoding)
@@ -121,6 +127,38 @@ def test_a_heading_is_unwrapped(write: Write) -> None:
     assert found.what == "heading"
     np.testing.assert_allclose(found.value, np.radians(turned), atol=1e-12)
     np.testing.assert_allclose(found.error, np.radians(1 + TIMES), rtol=1e-12)
+
+
+def test_two_points_that_a_tracker_follows_are_a_heading(write: Write) -> None:
+    """The first moves about, and both are in pixels of any size."""
+    x, y, turned = 300 + 40 * TIMES, 200 - 9 * TIMES, 5 * TIMES
+    columns = [TIMES, x + 120 * np.cos(turned), y + 120 * np.sin(turned), x, y]
+    found = film.read(write(table("t (s),x_2,y_2,x_1,y_1", *columns), "film.csv"))
+    assert (found.what, found.error) == ("heading", None)
+    np.testing.assert_allclose(found.value, turned, atol=1e-12)
+    columns[3] = np.where(np.arange(20) == 4, np.nan, x)
+    assert film.read(write(table("t (s),x2,y2,x1,y1", *columns), "film.csv")).left_out == 1
+
+
+@pytest.mark.parametrize(("run", "value"), [("Run #1", SPINS), ("Run #2", UP), ("fast", TIMES)])
+def test_a_run_of_a_table_of_several_is_chosen_by_the_end_of_its_names(
+    write: Write, run: str, value: np.ndarray
+) -> None:
+    header = "Time (s) Run #1,Spin (rad/s) Run #1,Time (s) Run #2,Spin (rad/s) Run #2,time (s),Spin fast (rad/s)"
+    path = write(table(header, TIMES, SPINS, TIMES + 1, UP, TIMES, TIMES), "capstone.csv")
+    np.testing.assert_allclose(film.read(path, run=run).value, value, rtol=1e-12, atol=1e-12)
+    with pytest.raises(InputError, match="--run: there is no run Run #3; it has Time Run #1, Spin Run #1"):
+        film.read(path, run="Run #3")
+
+
+def test_a_run_of_a_table_of_several_is_chosen_by_the_word_of_its_column(write: Write) -> None:
+    rows = [f"{run},{t!r},{n!r}" for run, n in (("slow", 1.0), ("fast", 5.0)) for t in TIMES.tolist()]
+    path = write("\n".join(["run,t (s),n (rad/s)", *rows, ""]), "runs.csv")
+    assert set(film.read(path, run="fast").value) == {5.0}
+    with pytest.raises(InputError, match="--run: has several runs; name one; it has slow, fast"):
+        film.read(path)
+    with pytest.raises(InputError, match=r"there is no run fats \(did you mean fast\?\)"):
+        film.read(path, run="fats")
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("", np.pi / 180), (" (deg/s)", np.pi / 180), (" (rad/s)", 1.0)])
@@ -152,7 +190,7 @@ def test_a_film_of_very_many_rows_is_thinned(write: Write) -> None:
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("time\n1\n2\n", ":1:", "'spin (rad/s)', 'gyroscope z (rad/s)' or 'heading (deg)'; it has time"),
+        ("time\n1\n2\n", ":1:", "'spin (rad/s)', 'gyroscope z (rad/s)', 'heading (deg)' or 'x1, y1, x2, y2'; it has"),
         ("spin (m/s),time\n1,2\n", ":1:", "spin: is in 'm/s'; its unit must be rad/s, 1/s, deg/s, °/s or rpm"),
         (table("t,spin", TIMES[::-1], SPINS), ":3:", "the time decreases; sort the rows by time"),
         ("t,spin\n\n0,1\n2,1\n1,1\n", ":5:", "the time decreases; sort the rows by time"),
