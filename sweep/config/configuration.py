@@ -26,7 +26,7 @@ from sweep.models.general import laws
 from sweep.models.general.common import EXTRAS
 from sweep.models.general.solids import NOTHING, Assembly
 from sweep.models.general.surfaces import ELLIPSOID, SURFACES
-from sweep.models.model import Model, Tier
+from sweep.models.model import Model, Offer, Tier
 from sweep.models.origin import Origin
 from sweep.models.user import loading
 from sweep.models.variants import BASES, PAPER_LAW, Physics
@@ -155,7 +155,8 @@ class Config:
         how, kinds = self.integrator, measures.chosen(self.measure)
         margins = any(kind.name == Margin.name for kind in kinds) and not any(kind.exact for kind in kinds)
         repeats = self.repeats and how.estimate_errors and how.step == AUTO
-        return margins and how.settles and repeats and how.tolerance == AUTO
+        ends = how.settles and Offer.LINEAR in self.tier.offers
+        return margins and ends and repeats and how.tolerance == AUTO
 
     @property
     def tolerance(self) -> float:

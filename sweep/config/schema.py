@@ -102,7 +102,7 @@ class Integrator(Strict):
         default="auto",
         description="permitted error in spin at t = 400, in sqrt(g/c), from which automatic steps are chosen; or "
         f"`auto`: what each count needs to be certain, or {TOLERANCE:g} if anything but counts, margins, energy errors "
-        "and resting spins is measured, or if `stop_early` is false",
+        "and resting spins is measured, or if no trajectory may settle",
     )
     estimate_errors: bool = Field(
         default=True,

@@ -153,7 +153,7 @@ def test_progress_counts_the_work_of_cells_whose_second_runs_run_beside_first_ru
     counted: list[float],
 ) -> None:
     """A bar that is at 60 % has 60 % of the steps behind it, once enough runs have ended to guess the others by."""
-    (part,) = plan(load_config(MAP)).parts
+    (part,) = plan(load_config(MAP, {"tolerance": 1e-8})).parts
     each, shares, beside = Lives(part), list[tuple[float, float]](), list[bool]()
 
     def check() -> None:
