@@ -52,6 +52,11 @@ def deferred() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
+def heard() -> bool:
+    """Return whether a Ctrl-C waits for the next `point`."""
+    return _heard
+
+
 def point() -> None:
     """Raise a Ctrl-C that has been deferred; to be called where everything is consistent, some times a second."""
     global _heard

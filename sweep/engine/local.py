@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from sweep.engine.lives import Lives
 from sweep.engine.outcome import results
 from sweep.engine.plan import plan
 from sweep.grid import Array, Grid, Tile
-from sweep.interrupt import point
+from sweep.interrupt import heard, point
 from sweep.kernels.status import IMPOSSIBLE, SETTLED
 from sweep.prediction import predict
 from sweep.results.provenance import this_cpu
@@ -37,7 +38,7 @@ def run_batch(
 
     Parameters
     ----------
-    store : saves the state rows after each chunk
+    store : saves the state rows between chunks
     left : the state rows of this batch that an earlier run left, to be resumed
     after_chunk : called with the number of finished cells of the batch, fractional where a cell is run more than once,
         and the number of failed ones
@@ -56,18 +57,52 @@ def run_batch(
     for each in lives:
         each.resume(left.tables if left else {})
 
+    saves = _Saves()
+
+    def save() -> None:
+        if store:
+            with saves:
+                tables = {name: table for each in lives for name, table in each.saved().items()}
+                store.save_running(Running(list(batch), tables, time.perf_counter() - began))
+
     def report() -> None:
         # Save state rows only between two chunks: anywhere else an interrupt may find half of them advanced.
-        if store:
-            tables = {name: table for each in lives for name, table in each.saved().items()}
-            store.save_running(Running(list(batch), tables, time.perf_counter() - began))
-        after_chunk(*progress(lives))
+        if saves.due or heard():
+            save()
+        try:
+            after_chunk(*progress(lives))
+        except BaseException:
+            save()
+            raise
 
     live(lives, report)
     found = results(job, lives)
     cost = {"seconds": np.array((time.perf_counter() - began) / len(batch)), "cpu": cpu}
     for i, arrays in zip(batch, job.by_grid(found), strict=True):
         yield i, arrays | cost
+
+
+@dataclass
+class _Saves:
+    """Say when state rows are to be saved next, so that saving takes a fiftieth of the time.
+
+    Saved after each chunk, they took a fifth of the time of `configs/mu_b.yaml`.  A run that is killed loses what was
+    computed since; one that is interrupted saves first.
+    """
+
+    ended: float = 0.0
+    seconds: float = 0.0
+
+    @property
+    def due(self) -> bool:
+        return time.perf_counter() - self.ended > 50 * self.seconds
+
+    def __enter__(self) -> None:
+        self.seconds = -time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self.ended = time.perf_counter()
+        self.seconds += self.ended
 
 
 def batches(
