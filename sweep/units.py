@@ -96,7 +96,10 @@ def factor(written: str, unit: Unit | None) -> float | None:
     for over, name, power in re.findall(_FACTOR, plain):
         size, one = _FACTORS.get(name, (nan, NUMBER))
         times = int(power or 1) * (-1 if over else 1)
-        scale *= size**times
+        try:
+            scale *= size**times
+        except OverflowError:
+            return None
         powers = [each + times * more for each, more in zip(powers, astuple(one), strict=True)]
     same = bool(re.fullmatch(f"({_FACTOR} ?)+", plain)) and Unit(*powers) == unit
     return scale if same and isfinite(scale) else None

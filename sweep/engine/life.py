@@ -47,6 +47,7 @@ from sweep.engine.lives import (
 from sweep.grid import Array
 from sweep.kernels.kernel import FAILURE
 from sweep.kernels.layout import Table
+from sweep.kernels.measures.reversals import Reversals
 from sweep.kernels.method import TOLERANCE
 from sweep.kernels.status import DIVERGED, FAILURES, SETTLED, TIME_LIMIT, Doubt
 from sweep.models.model import take
@@ -185,17 +186,22 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
     """
     first, second, notes = lives.take(which, lives.aside), lives.take(which), lives.notes
     found = compare(first, second, lives.left(which))
+    coarse, count = first.rules.by_count & (first.tolerance > 2 * TOLERANCE), first.recorded(Reversals.name)
+    # Where errors are amplified, each repeat gives chance another try: so a count of 47 became certain that may be 40.
+    other = np.isfinite(notes["count"][which]) & (notes["count"][which] != count)
+    found = found._replace(reversals=np.where(other, np.nan, found.reversals))
     permitted, known = allowed(first, first.rules.tolerance), ~limited_by_round_off(first)
     excess = np.where(known, found.spin / (AIM * permitted), 0.0)
     by_chance = known & (excess <= 1) & (OF_RATTLE * found.rattle > AIM * permitted)
     if first.rules.by_count:
-        excess = np.fmax(excess, _of_count(first, found))
-    shorter, most = _shorter(first, found, excess, by_chance, notes[which])
+        excess = np.where(coarse, np.fmax(excess, _of_count(first, found)), excess)
+    shorter, most = _shorter(first, found, excess, by_chance, coarse, notes[which])
     again = np.isfinite(shorter) & first.rules.repeats
     lives.rows[which] = first.rows
     note(notes, "error", which, found)
     notes["missed"][which] = ~again & known & (found.reported > permitted) & (not first.rules.fixed)
     notes["repeats"][which] += again
+    notes["count"][which] = np.where(first.rules.by_count & again & ~coarse, count, notes["count"][which])
     notes["most_excess"][which[again]] = most[again]
     finer = shorter**_ORDER if first.rules.by_count else np.ones(len(which))
     yield which[again], Repeat(first.step[again] / shorter[again], first.tolerance[again] / finer[again])
@@ -203,7 +209,7 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
 
 
 def _of_count(run: Cells, errors: Errors) -> Array:
-    """Return the factor by which errors have to fall for a count to be certain, shape (cells,).
+    """Return the factor by which errors of a coarse run have to fall for a count to be certain, shape (cells,).
 
     It is infinite where this is unknown: with another count, or a spin that cannot be predicted beyond the first leg.
     At another time limit a parity says nothing, because the spin may be about to reverse.
@@ -246,7 +252,9 @@ _TOO_LITTLE = 1.5
 _ORDER = 5
 
 
-def _shorter(run: Cells, errors: Errors, excess: Array, by_chance: Array, notes: Array) -> tuple[Array, Array]:
+def _shorter(
+    run: Cells, errors: Errors, excess: Array, by_chance: Array, coarse: Array, notes: Array
+) -> tuple[Array, Array]:
     """Return the factors by which to shorten the steps, and the largest excess with which to repeat again, (cells,).
 
     A factor is NaN if the error is small enough, or if no shorter step is of use: a cell misses its tolerance once a
@@ -260,9 +268,10 @@ def _shorter(run: Cells, errors: Errors, excess: Array, by_chance: Array, notes:
     ----------
     excess : the factor by which the errors have to fall, shape (cells,); infinite where it is unknown
     by_chance : where spins agree, but not the rattles, shape (cells,)
+    coarse : where a count may still need a finer tolerance, shape (cells,)
     notes : what is noted of the cells, shape (cells,)
     """
-    first, coarse = notes["repeats"] == 0, run.rules.by_count & (run.tolerance > 2 * TOLERANCE)
+    first = notes["repeats"] == 0
     unknown, doubtful = np.isinf(excess), (errors.spin > AMPLIFIED * imbalance(run)) | (errors.apart > APART)
     shorter = np.where(unknown | by_chance, run.kernel.stepper.longer, np.fmax(excess ** (1 / _ORDER), 1.0))
     shorter = np.clip(shorter, np.where(first, 1.0, _MILD), np.where(first & doubtful, _MILD, SHORTEST))

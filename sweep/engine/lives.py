@@ -31,13 +31,14 @@ FIRST, LATER = range(2)
 NOTES = np.dtype([
     ("stage", float), ("leg", float), ("step", float), ("step_rule", float), ("tolerance", float),
     ("halvings", float), ("step_before", float), ("met", [(name, float) for name in Met._fields]),
-    ("repeats", float), ("most_excess", float), ("missed", bool), ("error", [(name, float) for name in Errors._fields]),
-    ("left", [(name, float) for name in Ending._fields]),
+    ("repeats", float), ("count", float), ("most_excess", float), ("missed", bool),
+    ("error", [(name, float) for name in Errors._fields]), ("left", [(name, float) for name in Ending._fields]),
 ])  # fmt: skip
 """What is noted of each cell: its stage and leg; its step, what determined it (`STEP_RULES`), and its tolerance;
 how often the step was halved because of a failure, the step before, and what the last run met; how often the cell was
-repeated because of its error, the largest excess of the error with which another repeat is of use, and whether it
-misses its tolerance; its error; and what was left to come of its spin when the run stopped."""
+repeated because of its error, what the last run counted before if it was not coarse, the largest excess of the error
+with which another repeat is of use, and whether it misses its tolerance; its error; and what was left to come of its
+spin when the run stopped."""
 
 
 class Run(NamedTuple):
@@ -98,7 +99,7 @@ class Lives:
             self.notes[name] = getattr(cells, name)
         every = np.arange(len(self.notes))
         note(self.notes, "error", every, Errors(*np.full((len(Errors._fields), len(every)), np.nan)))
-        self.notes["most_excess"] = np.inf
+        self.notes["most_excess"], self.notes["count"] = np.inf, np.nan
         # Pages that are never written take no memory.
         self.before, self.aside = np.zeros_like(self.rows), np.zeros_like(self.rows)
         self._begin(every, cells.rows.copy())

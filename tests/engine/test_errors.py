@@ -202,7 +202,7 @@ def test_spins_differ_from_the_plain_method_at_half_its_step_as_estimated(name: 
 
     One of 40 may differ by more than ten times the estimate: 5 of 240 do.
     """
-    config = load_config(ROOT / "configs" / f"{name}.yaml", {"t_end": 1000.0})
+    config = load_config(ROOT / "configs" / f"{name}.yaml", {"t_end": 1000.0, "tolerance": 1e-8})
     grid = config.grid
     job = plan(config, grid.take(np.linspace(0, grid.size - 1, min(grid.size, 240)).astype(int)))
     lives = [Lives(part) for part in job.parts]
