@@ -116,6 +116,7 @@ def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
 def test_a_later_reversal_is_not_taken_for_the_first(whole: xr.Dataset) -> None:
     assert field(whole.isel(reversal=[1]), "t_first_reversal").isnull().all()
     assert "ratio" not in derivable(whole.isel(reversal=1))
+    assert field(whole.isel(reversal=[1, 0]), "ratio").equals(field(whole, "ratio"))
 
 
 def test_the_explorer_shows_derived_quantities_of_a_cell(whole: xr.Dataset) -> None:

@@ -11,7 +11,7 @@ _UNSETTLED = {"time_limit": "not settled: time limit"}
 
 def _first(dataset: xr.Dataset) -> xr.DataArray:
     times = dataset["reversal_times"]
-    found = times.isel(reversal=0, drop=True).where(times["reversal"].values[0] == 1)
+    found = times.where(times["reversal"] == 1).sum("reversal", min_count=1, keep_attrs=True)
     return found.rename("t_first_reversal").assign_attrs(long_name="time of the first reversal")
 
 
