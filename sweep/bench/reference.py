@@ -60,7 +60,7 @@ def comparisons() -> Iterator[tuple[str, str, Spins]]:
     for model, reference in read_spins().items():
         for method in allowed(MODELS[model]):
             mu = reference.columns.get("mu", np.zeros(len(reference.spins)))
-            yield model, method, reference.select((mu <= STEEPEST) | (not METHODS[method].limited))
+            yield model, method, reference.select((mu <= STEEPEST) | (METHODS[method].real_stability == np.inf))
 
 
 def spin_errors(kernel: Kernel, reference: Spins, step: Array) -> Array:

@@ -55,7 +55,7 @@ class Cells:
     stable: StableRanges
     """Ranges of spin in which the rattle decays."""
     rows: Array
-    """State rows, shape (cells, quantities)."""
+    """State rows, shape (cells, quantities); those of a plan are at t = 0, and have no steps yet."""
 
     @property
     def method(self) -> str:
@@ -99,6 +99,6 @@ class Cells:
         )  # fmt: skip
 
     def start(self, step: Array | None = None, t_end: float | Array | None = None) -> Array:
-        """Return state rows of these cells at t = 0, with their own steps and time limit, or with others."""
+        """Return the state rows of a plan, ready for their own steps and time limit, or for others."""
         wanted, until = (self.step if step is None else step), (self.rules.t_end if t_end is None else t_end)
-        return self.kernel.start(self.columns, wanted, until, self.stable)
+        return self.kernel.begin(self.rows, self.columns, wanted, until)

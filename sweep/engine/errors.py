@@ -178,5 +178,5 @@ def second_steps(part: Cells) -> Array:
     """Return the steps of the second runs, in sqrt(c/g), shape (cells,): longer, but within the stability limit."""
     method = part.kernel.stepper
     with np.errstate(divide="ignore"):
-        stable = _NEARER * method.stable_step(part.model.fastest_decay(part.columns))
+        stable = _NEARER * method.stable_step(part.table["decay"])
     return np.asarray(part.table["step"] * np.clip(stable / part.table["step"], _NEARER, method.longer))

@@ -31,13 +31,15 @@ FIRST, LATER = range(2)
 NOTES = np.dtype([
     ("stage", float), ("leg", float), ("step", float), ("step_rule", float), ("tolerance", float),
     ("halvings", float), ("step_before", float), ("met", [(name, float) for name in Met._fields]),
-    ("repeats", float), ("count", float), ("most_excess", float), ("missed", bool),
-    ("error", [(name, float) for name in Errors._fields]), ("left", [(name, float) for name in Ending._fields]),
+    ("repeats", float), ("count", float), ("lowest", float), ("highest", float), ("most_excess", float),
+    ("missed", bool), ("error", [(name, float) for name in Errors._fields]),
+    ("left", [(name, float) for name in Ending._fields]),
 ])  # fmt: skip
 """What is noted of each cell: its stage and leg; its step, what determined it (`STEP_RULES`), and its tolerance;
 how often the step was halved because of a failure, the step before, and what the last run met; how often the cell was
-repeated because of its error, what the last run counted before if it was not coarse, the largest excess of the error
-with which another repeat is of use, and whether it misses its tolerance; its error; and what was left to come of its
+repeated because of its error, what the last run counted before if it was not coarse, the lowest and the highest spin
+at the ends of its runs, the largest excess of the error with which another repeat is of use, and whether it misses its
+tolerance; its error; and what was left to come of its
 spin when the run stopped."""
 
 
@@ -100,9 +102,10 @@ class Lives:
         every = np.arange(len(self.notes))
         note(self.notes, "error", every, Errors(*np.full((len(Errors._fields), len(every)), np.nan)))
         self.notes["most_excess"], self.notes["count"] = np.inf, np.nan
+        self.notes["lowest"], self.notes["highest"] = np.inf, -np.inf
         # Pages that are never written take no memory.
         self.before, self.aside = np.zeros_like(self.rows), np.zeros_like(self.rows)
-        self._begin(every, cells.rows.copy())
+        self._begin(every, cells.start())
 
     @property
     def stage(self) -> Array:
@@ -135,6 +138,10 @@ class Lives:
         step, rule, tolerance = (self.notes[name][which] for name in ("step", "step_rule", "tolerance"))
         return replace(self.cells.take(which, rows), step=step, step_rule=rule, tolerance=tolerance)
 
+    def started(self, which: Array | slice = slice(None), *how: Array) -> Array:
+        """Return state rows of some cells at t = 0, with their present steps, or with others (`Cells.start`)."""
+        return self.take(which, self.cells.rows).start(*how)
+
     def left(self, which: Array | slice = slice(None)) -> Ending:
         """Return what was left to come of the spins of some cells when their runs stopped."""
         return Ending(*(self.notes["left"][name][which] for name in Ending._fields))
@@ -153,15 +160,15 @@ class Lives:
             case Approach():
                 # A failure with fewer steps before it is followed from the start (`failures.met`).
                 goal = np.maximum(self.table["done"][which] - AHEAD, 1)
-                self._run_again(which, APPROACH, self.take(which).start(), goal=goal)
+                self._run_again(which, APPROACH, self.started(which), goal=goal)
             case Second(step, t_end, settles):
-                self._run_again(which, SECOND, self.take(which).start(step, t_end), settles=settles)
+                self._run_again(which, SECOND, self.started(which, step, t_end), settles=settles)
             case Repeat(step, tolerance):
                 self.notes["step"][which], self.notes["tolerance"][which] = step, tolerance
                 self.notes["error"][which] = np.nan
                 if not self.cells.rules.fixed:
                     self.notes["step_rule"][which] = REPEAT
-                self._begin(which, self.take(which).start())
+                self._begin(which, self.started(which))
             case Done():
                 self.notes["stage"][which] = DONE
 

@@ -88,7 +88,7 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     parts = list[Cells]()
     for each in chosen:
         theirs = take(stable, each.cells)
-        rows = each.kernel.start(each.columns, each.step, how.t_end, theirs)
+        rows = each.kernel.initial(each.columns, theirs)
         parts.append(Cells(config.equations, rules, *each, np.full(len(rows), tolerance), theirs, rows))
     return Plan(config, grids, predictions, tuple(parts))
 

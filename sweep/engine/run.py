@@ -55,11 +55,11 @@ def run(
     config = load_config(config, overrides)
     dataset.check_names(config)
     quantities.check_pictures(config)
-    reporter, identity = reporter or Reporter(), identify(config)
+    reporter = reporter or Reporter()
     if output is None:
         with connected(client) as there:
             return _compute(config, Store(), reporter, there).dataset()
-    files = RunFiles(local_path(output), config.name, config.picture)
+    files, identity = RunFiles(local_path(output), config.name, config.picture), identify(config)
     with files.locked(reporter.note), connected(client) as there:
         if fresh:
             _forget_pictures(config, files)

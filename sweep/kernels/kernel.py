@@ -31,8 +31,11 @@ _PROGRESS = ("steps", "goal", "settles", "done", "status")
 """The number of steps to t_end; the number after which the row stops; whether it stops (not zero) as soon as its spin
 can reverse no more; the number of steps done; and the status."""
 
-_BASE = ("step", "stable_step", *_PROGRESS, "energy_start", "energy", *FAILURE, *STABLE)
+_BASE = ("step", "decay", *_PROGRESS, "energy_start", "energy", *FAILURE, *STABLE)
 """Quantities of every state row."""
+
+STABILITY_SHARE = 0.9
+"""Share of the stability limit that an automatic step uses for the fastest decay."""
 
 STRETCH = 100.0
 """A step divides this time evenly if t_end is a multiple of it, in sqrt(c/g).  So its length does not depend on t_end:
@@ -82,8 +85,8 @@ class Stepper:
     takes_every_step: bool = False
     """Whether it takes equal, independent steps from t = 0 to the end: a run may then stop after any step and continue
     towards another goal."""
-    limited: bool = False
-    """Whether the limit of stability may set the step."""
+    real_stability: float = np.inf
+    """The longest stable step times the rate of the fastest decay; infinite if stability never limits the step."""
     energy_gain: float = 1e-5
     """Share by which the energy of a body may seem to grow from one check to the next, although friction only removes
     energy: beyond it the integration has gone wrong.  Over 40 bodies at 0.3 to 2 times the stability limit, 1e-5
@@ -115,8 +118,8 @@ class Stepper:
         raise NotImplementedError
 
     def stable_step(self, decay: Array) -> Array:
-        """Return the longest stable step, shape (cells,), in sqrt(c/g); infinite unless it is `limited`."""
-        return np.full_like(decay, np.inf)
+        """Return the longest automatic step that is stable, shape (cells,), in sqrt(c/g)."""
+        return np.asarray(STABILITY_SHARE * self.real_stability / decay)
 
     def quantities(self, model: Model, *, work: bool) -> tuple[str, ...]:
         """Return the names of the quantities that it adds to a state row; `work` as of `Kernel`."""
@@ -183,7 +186,8 @@ class Kernel:
         may_settle = all_true("may_settle", "group, lane, spin, at_rest", self.hooks("make_may_settle"))
         shown = any_true("shown", "group, lane", self.hooks("make_settled"))
         measure = call_all("measure", "group, lane, seen", self.hooks("make_check"))
-        check = make_check(self.model, self.layout, may_settle, shown, measure, self.stepper.energy_gain)
+        gain, stability = self.stepper.energy_gain, self.stepper.real_stability
+        check = make_check(self.model, self.layout, may_settle, shown, measure, gain, stability)
         advance = make_advance(self.stepper.body(self), check, self.layout)
         measured = "+".join(each.spec for each in self.measurements)
         name = f"{self.model.key}-{self.method}-{measured}"
@@ -223,8 +227,13 @@ class Kernel:
         t_end : time limit in sqrt(c/g), a number or of shape (cells,)
         stable : the ranges of spin in which the rattle decays; by default none are known
         """
-        table = self.table(np.zeros((len(step), len(self.layout.names))))
-        if not len(step):
+        return self.begin(self.initial(columns, stable), columns, step, t_end)
+
+    def initial(self, columns: Columns, stable: StableRanges | None = None) -> Array:
+        """Return the state rows of trajectories at t = 0 that have no steps yet; parameters as of `start`."""
+        cells = len(columns["a"])
+        table = self.table(np.zeros((cells, len(self.layout.names))))
+        if not cells:
             return table.rows
         states, constants = stack(self.model.start(columns)), self.model.constants.of(columns)
         table.set_columns(self.model.states, states.T)
@@ -237,8 +246,16 @@ class Kernel:
         for each in self.measurements:
             for name, values in each.start(self.model, columns, rattle).items():
                 table[name] = values
-        with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method
-            self.stepper.prepare(self, table, columns, step, t_end)
+        if np.isfinite(self.stepper.real_stability):
+            table["decay"] = self.model.fastest_decay(columns)
+        return table.rows
+
+    def begin(self, initial: Array, columns: Columns, step: Array, t_end: float | Array) -> Array:
+        """Return a copy of state rows that `initial` made, ready for the first step; parameters as of `start`."""
+        table = self.table(initial.copy())
+        if len(initial):
+            with np.errstate(invalid="ignore"):  # a cell may fail during the start-up of a method
+                self.stepper.prepare(self, table, columns, step, t_end)
         return table.rows
 
     def advance(self, rows: Array, cells: Array, blocks: int, least: int | None = None) -> int:

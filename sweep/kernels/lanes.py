@@ -97,7 +97,7 @@ def make_advance(run_block, check, layout: Layout):
     return advance
 
 
-def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_gain: float):
+def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_gain: float, real_stability: float):
     """Compiled (group) -> None: checks all lanes between two blocks, and decides which ones end.
 
     Parameters
@@ -105,7 +105,7 @@ def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_
     may_settle : inline (group, lane, spin, at_rest) -> whether all measurements allow the trajectory to settle
     shown : inline (group, lane) -> whether a measurement has shown that the spin can reverse no more
     measure : inline (group, lane, seen), what the measurements do at a check (see `Measurement.make_check`)
-    energy_gain : share by which the energy of a body may apparently grow from one check to the next
+    energy_gain, real_stability : as of `sweep.kernels.kernel.Stepper`
     """
     load_states, load_constants, store_states = make_access(model, layout)
     energy, rest = model.energy, make_rest(len(model.states), model.spin_state)
@@ -113,8 +113,8 @@ def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_
     will_settle = _make_will_settle(layout, may_settle, saturates, slows=model.slows)
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
     decides, decided = model.decided is not never_decided, model.decided
-    GOAL, DONE, STATUS, ENERGY_ROW, STABLE_STEP, SETTLES = map(
-        layout.at, ("goal", "done", "status", "energy", "stable_step", "settles")
+    GOAL, DONE, STATUS, ENERGY_ROW, STEP, DECAY, SETTLES = map(
+        layout.at, ("goal", "done", "status", "energy", "step", "decay", "settles")
     )  # fmt: skip
     lanes, allowed, conserved = LANES, 1.0 + energy_gain, Offer.ENERGY in model.offers
     wide = full_width()
@@ -153,7 +153,9 @@ def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_
             # more strongly until it looks like one of these failures.
             finite = abs(total) <= MAX_ENERGY
             false = (
-                (not finite) | (conserved & (total > before * allowed)) | (failed & (group[STABLE_STEP + lane] == 0.0))
+                (not finite)
+                | (conserved & (total > before * allowed))
+                | (failed & (group[STEP + lane] * group[DECAY + lane] > real_stability))
             )
             group[STATUS + lane] = DIVERGED if (running | failed) & false else status
             ended = (status != RUNNING) & (status != QUIET)

@@ -13,16 +13,13 @@ import numpy as np
 
 from sweep.jit import exactly_compiled, full_width
 from sweep.kernels.codegen import make_accept, make_access
-from sweep.kernels.kernel import Kernel, Stepper, steps_to
+from sweep.kernels.kernel import STABILITY_SHARE, Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, PACK, Table
 from sweep.kernels.method import TOLERANCE, Tolerance
 from sweep.kernels.status import RUNNING
 from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model
-
-_STABILITY_SHARE = 0.9
-"""Share of the stability interval that an automatic step uses for the fastest decay."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,14 +41,10 @@ class RungeKutta(Stepper):
             moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
             return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
 
-    def stable_step(self, decay: Array) -> Array:
-        return np.asarray(_STABILITY_SHARE * self.tableau.real_stability / decay)
-
     def prepare(self, kernel: Kernel, table: Table, columns: Columns, step: Array, t_end: float | Array) -> None:
         """Take steps no longer than `step` that divide `t_end` evenly."""
         table["steps"] = table["goal"] = goal = steps_to(t_end, step)
         table["step"] = t_end / goal
-        table["stable_step"] = table["step"] * kernel.model.fastest_decay(columns) <= self.tableau.real_stability
 
     def body(self, kernel: Kernel):
         model, layout = kernel.model, kernel.layout
@@ -113,11 +106,11 @@ def method(tableau: Tableau) -> RungeKutta:
         name=tableau.name,
         code=tableau.code,
         summary=tableau.summary,
-        step_words=f"{_STABILITY_SHARE:g} of the stability limit",
+        step_words=f"{STABILITY_SHARE:g} of the stability limit",
         step_cost=tableau.stages / DOPRI5.stages,
         automatic=tableau.automatic,
         error_order=tableau.order,
         takes_every_step=True,
-        limited=True,
+        real_stability=tableau.real_stability,
         tableau=tableau,
     )

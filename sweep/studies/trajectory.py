@@ -156,8 +156,8 @@ def _followed(chosen: Config, every: float | None, reporter: Reporter) -> xr.Dat
 
     marks = _run(part, rows, report)
     live([each], report)
-    if ((ended := each.take()).step != part.step).any():
-        again = ended.start()
+    if (each.notes["step"] != part.step).any():
+        again = each.started()
         kernel.table(again)["settles"] = part.rules.settles
         marks = _run(part, again)
     _judge(each)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import sweep
 from sweep.config import load_config
 from sweep.engine import life
 from sweep.engine import plan as planning
+from sweep.engine.cells import Cells
 from sweep.engine.executor import execute
 from sweep.engine.life import live
 from sweep.engine.lives import Lives
@@ -155,6 +157,21 @@ def test_a_chaotic_cell_says_so() -> None:
     to_their_ends = run_cells([CHAOTIC, BODY])
     assert to_their_ends.status.values.tolist() == [SETTLED, SETTLED]
     assert to_their_ends.certain.values.tolist() == [0, 1]
+
+
+def test_a_missed_cell_reports_the_spread_of_all_its_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They differ by amplified round-off, and the last two may agree by chance."""
+    body = {"a": 21.1475987, "b": 1.58807895, "c": 1.33265007, "delta": 0.405887126}
+    spins, shorter = list[float](), life._shorter
+
+    def seen(run: Cells, *more: Any) -> Any:
+        spins.extend(run.kernel.spins(run.rows))
+        return shorter(run, *more)
+
+    monkeypatch.setattr(life, "_shorter", seen)
+    found = run_cells([body | {"mu": 20.3066782, "n0": -0.0546181328, "x0": 0.789991263, "y0": 0.049804034}])
+    assert int(found.doubts[0]) & Doubt.TOLERANCE
+    assert float(found.spin_error[0]) >= np.ptp(spins) > 1e-4
 
 
 SENSITIVE = [

@@ -104,8 +104,9 @@ def test_their_first_runs_alone_are_paradoxes() -> None:
     cells = {name: [THIN[name], (STANDARD | STIFF)[name]] for name in THIN}
     scene = {"name": "once", "cases": cells, "start": {"x0": 0.01, "y0": 0.01}}
     (part,) = plan(load_config(scene, {"method": "adams", "t_end": 14.5})).parts
-    execute(part.kernel, part.rows)
-    assert part.status.tolist() == [PARADOX, PARADOX]
+    rows = part.start()
+    execute(part.kernel, rows)
+    assert part.kernel.table(rows)["status"].tolist() == [PARADOX, PARADOX]
 
 
 def test_one_run_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,6 +251,6 @@ def test_states_that_overflow_are_read_without_a_warning() -> None:
     (part,) = plan(
         load_config({"name": "unstable", "model": "effective", "friction": {"mu": 60.0}, "measure": ["reversals"]})
     ).parts
-    rows = part.rows.copy()
+    rows = part.start()
     rows[:, : len(part.kernel.model.states)] = 1e305
     assert part.kernel.spins(rows).shape == part.take(np.arange(len(rows)), rows).inertia.shape == (1,)

@@ -28,7 +28,7 @@ def mixed(kernel: Kernel) -> np.ndarray:
         "step": np.linspace(0.05, 0.12, 45), "mu": np.linspace(20, 900, 45), "b": np.tile([1.5, 3.0, 5.0], 15),
         "n0": np.tile([0.05, -0.03, 0.002, 0.02, 3.0], 9),
     }  # fmt: skip
-    if kernel.stepper.limited:
+    if np.isfinite(kernel.stepper.real_stability):
         decay = np.linspace(300, 66, 45)  # shares of the stability limit, from below to beyond it
         cells = {
             "step": np.where(FLYING, 1e-4, kernel.stepper.stable_step(decay)),

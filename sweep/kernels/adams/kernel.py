@@ -94,7 +94,6 @@ class Adams(Stepper):
         steps = np.maximum(steps_to(t_end, step), lead + 1)
         table["steps"] = table["goal"] = steps - lead
         table["step"] = step = t_end / steps
-        table["stable_step"] = True
         _set_method(form, table, kernel.unpack(table.rows)[1])
         constants = table.columns(kernel.constants)
         starts = stack(form.full.start(columns)).T
