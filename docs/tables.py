@@ -33,7 +33,7 @@ def _parameters() -> tuple[Row, list[Row]]:
             p.description or p.long_name,
             f"{pretty(named(p.units, SI))}, with `units: SI` alone" if p.name in SI_ALONE else _unit(p),
             "required" if p.default is None else f"{p.default:g}",
-            p.allowed,
+            p.allowed.removeprefix("a finite number "),
         )
         for p in PARAMETERS.values()
     ]
@@ -75,8 +75,9 @@ def _variables() -> tuple[Row, list[Row]]:
     rows = []
     for over, table in tables.items():
         for name, spec in table.items():
-            meaning = "see below" if spec.masks else spec.description or spec.long_name
-            if spec.flags and not spec.masks:
+            below = spec.masks or name == "status"
+            meaning = "see below" if below else spec.description or spec.long_name
+            if spec.flags and not below:
                 meaning += f" ({', '.join(f'{code} {flag}' for code, flag in spec.flags.items())})"
             rows.append((f"`{name}`", spec.dtype, over, _unit(spec), meaning))
     return ("variable", "type", "axes", "unit", "meaning"), rows
@@ -137,10 +138,9 @@ def _models() -> tuple[Row, list[Row]]:
     return ("model", "description", "states", "methods", "measures"), rows
 
 
-def _functions() -> tuple[Row, list[Row]]:
-    """Functions first, in the order of their names, then classes."""
-    public = sorted((inspect.isclass(getattr(sweep, name)), name) for name in sweep.__all__)
-    rows = [(f"`sweep.{name}`", inspect.getdoc(getattr(sweep, name)).partition("\n")[0]) for _, name in public]
+def _classes() -> tuple[Row, list[Row]]:
+    public = sorted(name for name in sweep.__all__ if inspect.isclass(getattr(sweep, name)))
+    rows = [(f"`sweep.{name}`", inspect.getdoc(getattr(sweep, name)).partition("\n")[0]) for name in public]
     return ("name", "purpose"), rows
 
 
@@ -191,7 +191,7 @@ def _commands() -> str:
 
 
 _TABLES = (
-    _parameters, _units, _settings, _variables, _statuses, _doubts, _measurements, _methods, _models, _functions,
+    _parameters, _units, _settings, _variables, _statuses, _doubts, _measurements, _methods, _models, _classes,
 )  # fmt: skip
 
 MADE: dict[str, Callable[[], str]] = {

@@ -90,7 +90,7 @@ def run(
     """Run a sweep.
 
     If `output` holds the dataset of a smaller run, with fewer cells or an earlier `t_end`, only the missing part is
-    simulated. The result is the same, bit for bit, as if all cells had been run at once.
+    simulated.
 
     Parameters
     ----------
@@ -141,11 +141,8 @@ def boundaries(
 ) -> xr.Dataset:
     """Find where the number of reversals changes: curves over two axes, or points along a single one.
 
-    The cells of the configuration are simulated first. Where two neighbours along `x` or `y` have different counts,
-    further simulations bracket the place between them at which each count begins. Halfway between two points, two more
-    cells check whether the smooth curve passes between them; if not, a point is added there. Curves are found for each
-    value of the other axes. Along a single axis, cells where the slow equations estimate another count are
-    simulated as well.
+    Where two neighbouring cells of the configuration have different counts, further simulations bracket the place
+    between them at which each count begins. Curves are found for each value of the other axes.
 
     Parameters
     ----------
@@ -153,8 +150,8 @@ def boundaries(
     x, y : axes over which the curves are drawn; by default the second and the first with more than one value. A
         configuration may also have a single axis
     bracket : width of the brackets, relative to the value of the parameter along which each lies
-    deviation : largest distance of the boundary, halfway between two points, from the smooth curve through them,
-        relative to the lengths of the axes
+    deviation : largest distance of the boundary from the smooth curve through the points, halfway between two of them,
+        relative to the lengths of the axes; where it is larger, a point is added
 
     Returns
     -------
@@ -192,9 +189,8 @@ def critical(
 ) -> xr.Dataset:
     """Find the critical spins over all axes of `config` except n0, by formulas, eigenvalues and simulation.
 
-    Going outwards from zero, n_c1 is the first spin at which a tiny rattle grows, according to the eigenvalues. Going
-    outwards from n_c1, n_c2 is the first spin whose trajectory, from the configuration's start point, reverses before
-    t_end; it is bracketed by simulation.
+    Outwards from zero, n_c1 is the first spin at which a tiny rattle grows, and n_c2 the first one beyond it whose
+    trajectory, from the configuration's start point, reverses before t_end.
 
     Parameters
     ----------
@@ -204,8 +200,7 @@ def critical(
     Returns
     -------
     Dataset over the axes without n0, and over the `sign` of the spin, 1 and -1: `n_c1_linear` by the eigenvalues,
-    `n_c2_simulated` with the ends of its `n_c2_bracket`, and `n_c_reason`, which gives the reason where one of them is
-    missing.
+    `n_c2_simulated` with the ends of its `n_c2_bracket`, and `n_c_reason`, why one of them is missing.
 
     Raises
     ------
@@ -234,27 +229,27 @@ def trajectory(
     progress: bool | Callable[[float, str], None] | None = None,
     **overrides: Any,
 ) -> xr.Dataset:
-    """Follow the cells of a sweep with dense output, up to t_end.
+    """Follow single cells of a sweep over time, up to t_end.
 
-    The method is always dopri5, whatever the configuration names, because only dopri5 can stop anywhere for a sample.
+    The method is always dopri5, because only dopri5 can stop anywhere for a sample.
 
     Parameters
     ----------
     config, progress, overrides : as for `run`
-    at : the cells to follow, by parameter, such as ``{"mu": 60, "n0": [0.02, 0.05]}``; any values, also between those
-        of an axis. A parameter that is not given keeps its values. By default all cells, at most 1000
+    at : the cells to follow, by parameter, such as ``{"mu": 60, "n0": [0.02, 0.05]}``, on the grid or off it; other
+        parameters keep their values. By default all cells, at most 1000
     every : time between samples, in sqrt(c/g) or, with `units: SI`, in s, at least a step; by default nearly twenty
         per period of the fastest motion
-    stop_early : end a trajectory once spin and count can no longer change, as a sweep does, instead of at t_end,
-        whatever the configuration says; always so with `t_end: settled`
+    stop_early : end a trajectory once its count is final, as a sweep does, instead of at t_end, whatever the
+        configuration says; always so with `t_end: settled`
     samples : number of samples of the uncertain parameters to follow, instead of their medians; they are the first
         samples of a run
 
     Returns
     -------
     Dataset with the dimensions of a run of the same cells, and with the time: the series that the model supports, NaN
-    after the end of a trajectory. Also all results of a run, from the same steps, which the sampling does not change.
-    The status is `settled` if spin and count could no longer change after t_stop.
+    after the end of a trajectory. It also has all results of a run, which the sampling does not change. The status is
+    `settled` if the count is final at t_stop.
 
     Raises
     ------
@@ -289,7 +284,7 @@ def animate(
     Parameters
     ----------
     source : a configuration, as for `run`, or a dataset of `trajectory` or `fit`, or the path of its file, which ends
-        in .nc. For a fit, the film is shown beside the fitted body
+        in .nc. For a fit, the filmed body is shown next to the fitted one
     output : file to write; its suffix sets the format: gif, mp4 (needs ffmpeg) or html (a page that needs no network)
     begin, end : the interval of time shown; by default until twice the latest of the bodies' first reversals
     speed : time shown per second of the clip; by default such that the clip takes ten seconds
@@ -303,8 +298,8 @@ def animate(
     Raises
     ------
     InputError
-        as `trajectory`; also if there are too many bodies or they have no attitude, the interval is empty, the speed is
-        not positive, the clip is too long for its format, or the format is unknown.
+        as `trajectory`; also if the bodies are too many or have no attitude, or if the interval, the speed, the format
+        or the length of the clip cannot be used.
     FileError
         if the file is not a dataset, or `output` cannot be written.
     """
@@ -348,9 +343,7 @@ def fit(
 
     Parameters
     ----------
-    config, progress, overrides : as for `run`. A free parameter with several values is sought between the
-        smallest and the largest. The range of a free parameter with a single value is found from the film and the body,
-        and widened if the best value lies at its end. A parameter given as a distribution is also free, and the
+    config, progress, overrides : as for `run`. A parameter given as a distribution is free as well, and the
         distribution counts as a measurement
     film : a `sweep.config.film.Film`, or a table of numbers with a header: a time, and a spin ("spin (rad/s)"), the
         gyroscope reading of a phone on the body ("Gyroscope z (rad/s)") or a heading ("angle (deg)"). Intervals are
@@ -358,19 +351,18 @@ def fit(
     time_column, spin_column : names of the columns of the film, with a unit if it gives none, such as "omega (deg/s)";
         by default columns with known names
     run : the run, in a table of several: the end of the names of its columns, or the word in its column "run"
-    free : names of the parameters to find, including film_delay and film_bias of the film itself; the speed of a dry
-        law is free too unless `config` gives it
-    laws : laws of friction to compare, such as ``["viscous", "coulomb"]``.  Each law takes its parameters from
-        `config`; those that `config` does not give are also free. Parameters that a law does not have are ignored
+    free : names of the parameters to find, including film_delay and film_bias of the film itself. A parameter with
+        several values is sought between the smallest and the largest; otherwise the film and the body give the range
+    laws : laws of friction to compare, such as ``["viscous", "coulomb"]``.  Parameters of a law that `config` does not
+        give are free, and parameters that a law does not have are ignored
 
     Returns
     -------
     Dataset over (parameter): the `value` that fits best, and the ends of its intervals of 68 and 95 %.  Over (time):
-        the film, the fit, and which rows are outliers, left out of it.  Over (rank): all minima that were found.  The
-        attribute `fits` is 1 if the difference between film and curve is noise, and 0 if not; `fits_because` gives the
-        reason, `verdict` three sentences, `undetermined` what the film does not determine, and `config` runs the fitted
-        body.  With `laws`, dataset over (law, parameter) and (law, time); over (law): `chi_square`, `number_free`,
-        `akaike` and the `weight` of each.
+    the film, the fit, and outliers, which are left out of it.  Over (rank): all minima found.  The attribute `fits` is
+    1 if the difference between film and curve is noise, otherwise 0; `fits_because` gives the reason, `verdict` three
+    sentences, `undetermined` what the film does not determine, and `config` runs the fitted body.  With `laws`, all but
+    the minima is over (law) as well, with the `chi_square`, `number_free`, `akaike` and `weight` of each.
 
     Raises
     ------
@@ -514,7 +506,7 @@ class Accessor:
         return plot(self._dataset, variable, **options)
 
     def trajectory(self, **options: Any) -> xr.Dataset:
-        """Follow the cells of the dataset, or of what was selected of it, with dense output and its configuration.
+        """Follow the cells of the dataset, or of a selection, over time, with the configuration of the dataset.
 
         Arguments and result as for `sweep.trajectory`.
 

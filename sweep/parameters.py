@@ -96,8 +96,8 @@ _Row = tuple[str, Unit, str, float | None, _Bounds, *tuple[str, ...]]
 
 _SECTIONS: dict[str, tuple[_Row, ...]] = {
     "body": (
-        ("a", u.LENGTH, "long semi-axis a", 10.0, _SIZE, "Semi-axis of the ellipsoid at delta from x."),
-        ("b", u.LENGTH, "short semi-axis b", 3.0, _SIZE, "Semi-axis of the ellipsoid at delta from y."),
+        ("a", u.LENGTH, "long semi-axis a", 10.0, _SIZE, "Semi-axis of the ellipsoid, turned from x by delta."),
+        ("b", u.LENGTH, "short semi-axis b", 3.0, _SIZE, "Semi-axis of the ellipsoid, turned from y by delta."),
         ("c", u.LENGTH, "height c of the centre over the table", 1.0, _SIZE,
          "Semi-axis of the ellipsoid along z, the unit of length in the paper's units."),
         ("delta", u.ANGLE, "angle δ of the axes of inertia", 0.03, _ANGLE,

@@ -123,7 +123,7 @@ def test_the_exit_code_shows_whether_the_hard_cases_hold(
     monkeypatch.setattr(precision, "measure", lambda _: [measured("adams", 1e-7, 1.0)])
     result = invoke("bench", "--output", tmp_path)
     assert result.exit_code == code
-    assert f"hard cases that do not hold: {'none' if holds else 1}" in result.stdout
+    assert f"failed hard cases: {'none' if holds else 1}" in result.stdout
     assert "&lt;one&gt;" in (tmp_path / "bench.html").read_text(encoding="utf-8")
 
 

@@ -46,5 +46,5 @@ def _write(report: Callable[[Path, Callable[[str], None]], Sized], output: Path,
     require_writable(output / files.partition(",")[0])
     with Terminal():
         failed = report(output, click.echo)
-    say(f"\nwrote {output / files}; {rows} that do not hold: {len(failed) or 'none'}")
+    say(f"\nwrote {output / files}; failed {rows}: {len(failed) or 'none'}")
     sys.exit(ROWS_FAILED if failed else DONE)

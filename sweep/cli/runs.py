@@ -78,7 +78,7 @@ def run(config: Config, **how: Any) -> None:
 def trajectory(
     config: Config, at: dict[str, Any], samples: int | None, output: Path | None, dry_run: bool, quiet: bool, **how: Any
 ) -> None:
-    """Follow the cells of CONFIG, or of --at, with dense output.
+    """Follow single cells of CONFIG, or those of --at, over time.
 
     They run to t_end of CONFIG. Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact
     point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for

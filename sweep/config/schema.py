@@ -100,9 +100,9 @@ class Integrator(Strict):
         Annotated[float, Field(ge=1e-14, lt=1)] | Literal["auto"], Allowed("auto or a finite number >= 1e-14 and < 1")
     ] = Field(
         default="auto",
-        description="permitted error in spin at t = 400, in sqrt(g/c), from which automatic steps are chosen; or "
-        f"`auto`: what each count needs to be certain, or {TOLERANCE:g} if anything but counts, margins, energy errors "
-        "and resting spins is measured, or if no trajectory may settle",
+        description="permitted error in spin at t = 400, in sqrt(g/c), which sets automatic steps; or `auto`: as small "
+        f"as each count needs to be certain, or {TOLERANCE:g} if other things than counts, margins, energy errors and "
+        "resting spins are measured, or if no trajectory may settle",
     )
     estimate_errors: bool = Field(
         default=True,
@@ -122,8 +122,8 @@ class Integrator(Strict):
         bool | Annotated[float, Field(gt=0)], BeforeValidator(_in_si), Allowed("true, false or a finite number > 0")
     ] = Field(
         default=True,
-        description="whether a trajectory ends before `t_end` once spin and count can no longer change; or a time, "
-        "after which the others end too, unless their end can be predicted: see the table below",
+        description="whether a trajectory ends before `t_end` once its count is final; or a time at which the others "
+        "end too, unless their end can be predicted: see the table below",
     )
 
     @model_validator(mode="before")

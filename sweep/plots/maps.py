@@ -61,7 +61,8 @@ def draw(panels: Panels, limits: Limits = AUTO, cmap: str | None = None) -> Shee
         if group and not maps[0][group[0]].flags:
             of_group = [axes for i, axes in enumerate(frames) if names[i % len(names)] in group]
             words = labels.common(dataset, group[-1]) if panels.compared else labels.label(dataset, group[-1])
-            _bar(of_group, words, scales[group[-1]], int(width * RATIO * rows / _TICK))
+            inner = group != (panels.compared or panels.names)  # on the right its label would be that of the next map
+            _bar(of_group, words, scales[group[-1]], int(width * RATIO * rows / _TICK), left=inner)
     meanings = _meanings(panels, maps, scales[names[0]], shared)
     notes = dict.fromkeys(note for each in maps for shown in each.values() for note in shown.notes)
     figure.explain([*meanings, *entries.values()], notes=notes)
@@ -139,11 +140,12 @@ def _label_axes(
     axes.set(xlabel=x if lowest else "", ylabel=y if left else "")
 
 
-def _bar(beside: list[Axes], words: str, scale: Scale, most: int = 12) -> None:
-    """Draw the bar of a scale, labelled with these words, to the right of the maps that share it."""
+def _bar(beside: list[Axes], words: str, scale: Scale, most: int = 12, *, left: bool = False) -> None:
+    """Draw the bar of a scale to the right of the maps that share it, labelled with these words on the right or left."""
     figure = beside[0].figure
     bar = figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=beside, extend=scale.arrows, pad=0.02)
     bar.set_label(words)
+    bar.ax.yaxis.set_label_position("left" if left else "right")
     if scale.ticks:
         ticks = thinned(scale.ticks, most)
         bar.set_ticks(list(ticks), labels=list(ticks.values()))

@@ -82,15 +82,14 @@ def plot(
     variable : a variable of the dataset, or one of `sweep.plots.pictures.PICTURES`.  A comparison of two variables is
         drawn next to both, except in a figure as narrow as a column of text.  The default is the first one that the
         configuration names under `picture`, or else the reversals, compared with the prediction if there is one
-    x, y : the axes drawn across and upwards; by default the first two of more than four values.  Every combination of
-        the values of the other axes gets a panel, up to eight
-    at : values by axis, such as ``{"n0": 0.05}``; the nearest one that the dataset has is drawn
-    vmin, vmax : lowest and highest value of the scale, or of the vertical axis of curves; by default those that are
-        drawn
+    x, y : the horizontal and the vertical axis; by default the first two with more than four values.  Every combination
+        of the values of other axes gets a panel, up to eight
+    at : values by axis, such as ``{"n0": 0.05}``; the nearest one in the dataset is drawn
+    vmin, vmax : lowest and highest value of the scale, or of the vertical axis of curves; by default those drawn
     cmap : name of a colour map of matplotlib
     width : width of a figure for print, such as "85mm": no text is smaller than 6 points, except subscripts,
-        and panels have letters.  By default the figure is for a screen, or as wide as matplotlib's `figure.figsize` if
-        you have changed it.  The height follows from the panels
+        and panels have letters.  By default the figure is for a screen, or as wide as your own `figure.figsize` of
+        matplotlib.  The height follows from the panels
     title : title of the figure, "" for none; by default the title of the dataset
     ax : axes to draw one map or curve into, without title and legend.  Only `variable` is drawn, a map with a bar
     output : file to write; its suffix names the format: png, pdf or svg
@@ -103,10 +102,10 @@ def plot(
     Raises
     ------
     InputError
-        if the dataset has no such variable or axis, would need too many panels, or there is no such format or width; if
-        `output` is so narrow that the panels have no room.  With `ax`, if there are several panels.
+        if the dataset has no such variable or axis, the format or the width is unknown, there are too many panels (with
+        `ax`, more than one), or the figure is too narrow for them.
     FileError
-        if the file is not a dataset, if the dataset has lost what its figure needs, or `output` cannot be written.
+        if the file is not a dataset, the dataset lacks what its figure needs, or `output` cannot be written.
 
     Examples
     --------

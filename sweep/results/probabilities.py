@@ -10,7 +10,7 @@ from sweep.kernels.status import FAILURES, IMPOSSIBLE
 from sweep.units import NUMBER
 from sweep.variables import Variable
 
-_END = "end of the 95 % interval of the probability, by Wilson's formula; it is wide enough for Sobol points."
+_END = "end of the 95 % interval of the probability, by Wilson's formula."
 
 PROBABILITIES = {
     name: Variable("float64", NUMBER, long_name, description, along=("count",))

@@ -54,6 +54,16 @@ def test_a_variable_has_one_scale_and_one_bar_in_a_figure(size: dict[str, str]) 
     assert bars == ["spin reversals", "simulated − predicted"]
 
 
+def test_the_label_of_a_bar_is_nearer_to_its_bar_than_to_any_map() -> None:
+    figure = picture.plot(made())
+    figure.draw_without_rendering()
+    for bar in (axes for axes in figure.axes if axes.get_label() == "<colorbar>"):
+        label = bar.yaxis.label.get_window_extent()
+        places = {axes: axes.get_window_extent() for axes in [bar, *maps(figure)]}
+        apart = {axes: max(place.x0 - label.x1, label.x0 - place.x1) for axes, place in places.items()}
+        assert min(apart, key=lambda axes: apart[axes]) is bar
+
+
 @pytest.mark.parametrize("width", [None, "85mm", "180mm"])
 def test_a_boundary_is_drawn_with_its_number_or_not_at_all(width: str | None) -> None:
     one = made(n0=[0.02, 0.05])
