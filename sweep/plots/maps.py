@@ -141,7 +141,7 @@ def _label_axes(
 
 
 def _bar(beside: list[Axes], words: str, scale: Scale, most: int = 12, *, left: bool = False) -> None:
-    """Draw the bar of a scale to the right of the maps that share it, labelled with these words on the right or left."""
+    """Draw the bar of a scale to the right of the maps that share it, with these words to the right or left of it."""
     figure = beside[0].figure
     bar = figure.colorbar(ScalarMappable(scale.norm, scale.colours), ax=beside, extend=scale.arrows, pad=0.02)
     bar.set_label(words)
