@@ -137,20 +137,6 @@ def test_a_planted_difference_in_a_table_is_found() -> None:
     assert planted != text == RENEW["with_tables"](planted)
 
 
-_DRAWS = re.compile(r"python -m sweep (run|plot|trajectory|animate|critical|boundaries|fit|explore)\b(?!.*--dry)")
-_OF_OTHER_THINGS = {"cluster", "develop", "reproduce", "resume"}
-"""How-to pages whose commands draw, but which are about something else, or take minutes."""
-
-
-@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "how-to").glob("*.md")), ids=_name)
-def test_how_to_pages_that_draw_show_a_figure_soon(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    figure = re.search(r"^!\[", text, re.MULTILINE)
-    draws = bool(_DRAWS.search(text)) and page.stem not in _OF_OTHER_THINGS
-    assert bool(figure) >= draws
-    assert not figure or text.count("\n## ", 0, figure.start()) <= 1
-
-
 def test_every_stored_picture_stands_on_a_page() -> None:
     text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     stored = [path for path in (ROOT / "docs" / "_static").iterdir() if path.suffix in (".png", ".gif", ".svg")]

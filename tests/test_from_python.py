@@ -220,15 +220,6 @@ def test_parts_of_a_grid_are_combined_without_loss(tmp_path: Path) -> None:
     assert "wall_time" not in combined.attrs
 
 
-@pytest.mark.filterwarnings("ignore:In a future version of xarray:FutureWarning")
-def test_variables_of_the_same_cells_are_merged_without_loss() -> None:
-    """With xarray's own defaults."""
-    counts, more = sweep.run(SAID, measure=["reversals"]), sweep.run(SAID)
-    merged = xr.merge([counts, more, sweep.predict(SAID)])
-    same_numbers(merged[list(more.variables)], more)
-    assert merged.reversals.dtype == np.int16
-
-
 def test_a_dataset_does_what_the_package_does_with_it(tmp_path: Path) -> None:
     maps = sweep.run(SAID, tmp_path, mu=[40, 60, 80, 100, 120])
     assert maps.sweep.plot("status", at={"b": 3}, width="85mm").get_figwidth() == pytest.approx(85 / 25.4)

@@ -42,10 +42,6 @@ def test_datasets_have_the_accessor(imports: str) -> None:
     assert (result.stdout, result.stderr) == ("plot\n", "")
 
 
-def test_the_import_alone_loads_no_xarray() -> None:
-    assert run("import sys, sweep; print('xarray' in sys.modules)").stdout == "False\n"
-
-
 def test_windows_is_pointed_to_wsl() -> None:
     result = run("import sys; sys.platform = 'win32'; sys.modules['fcntl'] = None; import sweep")
     last = result.stderr.splitlines()[-1]

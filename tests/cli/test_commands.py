@@ -33,14 +33,6 @@ def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr
         assert all("_FillValue" not in v.encoding for v in stored.variables.values() if v.dtype.kind == "i")
 
 
-@pytest.mark.parametrize("cells", ["0.02..0.05:2", "[0.02, 0.05]", "{start: 0.02, stop: 0.05, num: 2}"])
-def test_cells_to_follow_are_written_as_values_of_a_configuration(cells: str, write: Write, tmp_path: Path) -> None:
-    text = "model: averaged\nname: two\nfriction: {mu: 60}\nintegrator: {t_end: 20}\n"
-    assert invoke("trajectory", write(text), "--output", tmp_path, "--at", f"n0={cells}").exit_code == 0
-    with xr.open_dataset(tmp_path / "two_trajectory.nc") as found:
-        assert found.n0.values.tolist() == [0.02, 0.05]
-
-
 NO_DATASETS = {
     "x.nc": "not a netCDF", "none.nc": "no such file", "other.nc": "not a dataset of sweep", "fifo": "not a file",
     "folder": "not a file",

@@ -113,12 +113,9 @@ REFUSED = {
     "body --length 12cm --width 3cm --height 1cm": "body: a size of the solid is missing; add mass or density",
     "body --mass 30g --width 3cm --height 1cm": "add length, radius_long or a",
     "body --mass 30g --length 12cm --width 3cm": "body: a size of the solid is missing; add height or c",
-    "body --length 1,250mm": "not '1,250mm'; write 1.250mm or 1250mm",
     "body --mass 30": "--mass: must be a number with its unit (kg, g, mg, oz or lb), not '30'",
-    "body --density 1g/cm2": "--density: must be a number with its unit (kg/m3 or g/cm3), not",
     "body --angle 100deg": "--angle: must be a finite number > -1.5708",
     "body --mass 30g --radius-long 1m --a 6cm --width 3cm --height 1cm": "body.a: cannot be combined with radius_long",
-    "body --mass 30g --length 12cm --width 3cm --height 15mm --c 1.0mm": "body: centre of mass outside the ellipsoid",
     "examples woden": "examples woden: no such example (did you mean wooden?)",
 }
 

@@ -15,7 +15,6 @@ from support.runs import same_numbers
 
 import sweep
 from sweep.cli import environment
-from sweep.results.writing import replacing
 
 TEXT = "name: quick\nmodel: averaged\nfriction: {mu: [40, 60]}\nintegrator: {t_end: 40}\n"
 
@@ -56,20 +55,6 @@ def test_an_error_of_the_system_that_the_user_can_mend_is_a_line(
 ) -> None:
     monkeypatch.setattr("sweep.results.summary.describe", Mock(side_effect=error))
     refused(invoke("info", file), said)
-
-
-@pytest.mark.parametrize("verb", ["run", "trajectory"])
-def test_a_picture_that_cannot_be_drawn_is_a_line_and_the_dataset_is_written(verb: str, tmp_path: Path) -> None:
-    (tmp_path / "quick.yaml").write_text(TEXT, encoding="utf-8")
-    (tmp_path / "matplotlibrc").write_text("text.usetex: true\n", encoding="utf-8")
-    nothing = {"PATH": str(tmp_path / "nothing"), "PYTHONPATH": str(ROOT)}  # so that there is no LaTeX
-    done = python("-m", "sweep", verb, "quick.yaml", "--output", "out", folder=tmp_path, **nothing)
-    (written,) = (tmp_path / "out").iterdir()
-    assert written.suffix == ".nc"
-    assert "mu" in sweep.open_dataset(written).coords
-    (said,) = [line for line in done.stderr.splitlines() if "picture" in line]
-    assert said.startswith("no picture: matplotlib cannot draw this figure: RuntimeError: Failed to process string")
-    assert "Traceback" not in done.stderr
 
 
 NONSENSE = {
@@ -191,22 +176,6 @@ def test_the_configuration_of_a_fit_is_written_whole_or_not_at_all(
     assert invoke(*words).exit_code == 0
     assert (tmp_path / "quick_fit.yaml").read_text() == "new: 1\n"
     assert (tmp_path / "mine.yaml").read_text() == "old: 1\n"
-
-
-@pytest.mark.usefixtures("_no_work")
-def test_a_lock_that_cannot_be_made_names_the_dataset(write: Write, tmp_path: Path) -> None:
-    (tmp_path / "out" / ".quick.lock").mkdir(parents=True)
-    refused(invoke("run", write(TEXT), "--output", tmp_path / "out"), "out/quick.nc: cannot be locked: Is a directory")
-
-
-def test_a_file_that_cannot_be_written_is_named_and_not_its_temporary_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    error = OSError(errno.EROFS, "Read-only file system", "hidden")
-    monkeypatch.setattr(Path, "unlink", Mock(side_effect=error))
-    with pytest.raises(sweep.FileError) as refusal, replacing(tmp_path / "x.png"):
-        raise error
-    assert str(refusal.value) == f"{tmp_path / 'x.png'}: cannot be written: Read-only file system"
 
 
 def test_a_picture_needs_a_free_name_in_a_folder_that_is_there(file: Path, tmp_path: Path) -> None:

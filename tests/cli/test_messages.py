@@ -33,7 +33,6 @@ MEANT = {
     "run c.yaml --set name.first=3": "--set name.first: name is a value, not a section; name a key such as friction.mu",
     "run c.yaml --set mu=1..2:100000 --set n0=1..2:100000": "0 cells are too many",
     "critical c.yaml --set x0=[0.01,0.02]": "--set x0: cannot be an axis of critical spins; give one number",
-    "trajectory c.yaml --at mu": "--at mu: must be NAME=VALUE, such as mu=60 or a=12cm",
 }  # fmt: skip
 
 

@@ -32,7 +32,6 @@ def file(tmp_path: Path) -> Path:
         ("--variable status --vmin 0", "vmin: status is drawn as categories, which have no scale; leave it out"),
         ("--at n0=0.02 --cmap gray", "cmap: reversals_predicted is drawn as a curve, which has no colour scale"),
         ("--at n0=0.066", "--at n0: 0.066 is far from all its values, 0.02 to 0.05; choose one of them"),
-        ("--at n0=0.02 --at n0=0.05", "--at n0: must be one finite number, not [0.02, 0.05]"),
     ],
 )
 def test_what_a_picture_has_no_use_for_is_refused(options: str, said: str, file: Path) -> None:
@@ -61,12 +60,6 @@ def test_the_picture_of_the_run_is_not_overwritten(options: str, name: str, file
 def test_a_selection_is_a_number(value: Any) -> None:
     with pytest.raises(InputError, match=r"^at\.n0: must be one finite number, not "):
         sweep.plot(sweep.predict(GRID), at={"n0": value})
-
-
-def test_a_selection_is_any_number_near_a_value() -> None:
-    maps = sweep.predict(GRID)
-    for value in (0.05, np.float32(0.05), maps.n0[1], 0.06):
-        assert sweep.plot(maps, at={"n0": value}).axes
 
 
 @pytest.mark.parametrize("every", [0, -1, np.nan, np.inf, "1", True])

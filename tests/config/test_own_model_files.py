@@ -191,7 +191,6 @@ def test_the_law_of_a_file_takes_the_place_of_law(folder: Path) -> None:
     for key, value, message in (
         ("friction.law", "coulomb", "friction.law: unknown key"),
         ("mu_static", 1.0, "mu_static: does not belong to the law fading; leave it out"),
-        ("offset", 0.03, r"centre of mass outside the ellipsoid"),
         ("body.surface", "cone", "body.surface: must be ellipsoid or paraboloid, not 'cone'"),
     ):
         with pytest.raises(InputError, match=message):

@@ -40,10 +40,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "colour: 3\n", 6, "colour", "unknown key; the keys here are name, model,"),
     (small("delta:", "dleta:"), 2, "body.dleta", "unknown key (did you mean delta?); the keys here are surface, solid, weights, a, b, c, delta"),
     ("mu: 60\n", 1, "mu", "unknown key (did you mean friction.mu?); the keys here are name"),
-    *(
-        (small("delta:", f"{key}: 0.1, delta:"), 2, f"body.{key}", "unknown key: the centre of mass lies on the axis through the surface's centre and lowest point, offset below that centre; no model")
-        for key in ("offset_x", "centre_of_mass_y")
-    ),
+    (small("delta:", "centre_of_mass_y: 0.1, delta:"), 2, "body.centre_of_mass_y", "unknown key: the centre of mass lies on the axis through the surface's centre and lowest point, offset below that centre; no model"),
     (SMALL + "name: again\n", 6, "name", "duplicate key, first on line 1"),
     (mu("[]"), 3, "friction.mu", "axis is empty; give at least one value"),
     (mu(".nan"), 3, "friction.mu", "must be a finite number >= 0 and < 1e+12, not nan"),
@@ -60,7 +57,6 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (step("method: euler"), 5, "integrator.method", f"must be {either([*METHODS, AUTO])}, not 'euler'"),
     ("model: averaged\nfriction: {mu: 60}\nintegrator: {method: adams}\n", 3, "integrator.method", "cannot run the averaged model; choose dopri5"),
     ("model: noslip\nfriction: {mu: [20, 60]}\n", 2, "friction.mu", "the noslip model has no mu; its param"),
-    ("model: analytic\nfriction: {mu: 60}\nstart: {x0: [0.01, 0.02]}\n", 3, "start.x0", "the analytic model has no x0"),
     ("model: effective\nfriction: {mu: 60}\nmeasure: [reversals, energy_error]\n", 3, "measure[1]", "energy_error cannot be measured on the effective model"),
     ("model: effective\nfriction: {mu: [0, 60]}\n", 2, "friction.mu", "must be at least 1e-300 for the effective model, not 0"),
     (step("step: aut"), 5, "integrator.step", "not 'aut' (did you mean auto?)"),
@@ -68,12 +64,9 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (step("step: 1.0e-320"), 5, "integrator.step", "steps to t_end; keep to 1e+15, or choose auto"),
     (step("method: auto, step: 0.1"), 5, "integrator.step", "must be auto with method: auto; or choose a method"),
     (step("t_end: -1"), 5, "integrator.t_end", "must be settled or a number >= 1e-06 and <= 1e+12, not -1"),
-    (step("t_end: 1e-300"), 5, "integrator.t_end", "must be settled or a number >= 1e-06 and <= 1e+12, not 1e-300"),
-    (step("t_end: .inf"), 5, "integrator.t_end", "must be settled or a number >= 1e-06 and <= 1e+12, not inf"),
     (step("t_end: settled, stop_early: false"), 5, "integrator.t_end", "settled needs stop_early, which is false; give a time"),
     (step("tolerance: 5e-324"), 5, "integrator.tolerance", "must be auto or a finite number >= 1e-14 and < 1, not 5e-324"),
     (step("stop_early: no"), 5, "integrator.stop_early", "must be true, false or a finite number > 0, not 'no'"),
-    (step("stop_early: 0"), 5, "integrator.stop_early", "must be true, false or a finite number > 0, not 0"),
     (SMALL + "measure: [colour]\n", 6, "measure[0]", "must be reversals, energy_error"),
     (SMALL + "measure: [reversals, reversal_times, {reversal_times: 3}]\n", 6, "measure", "duplicate measurement; name each once"),
     (SMALL + "measure: [{reversal_times: 3}]\n", 6, "measure[0]", "reversal_times is measured with the reversals; add reversals"),
@@ -119,7 +112,6 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("t_end: 5", "t_end: 5, method: adams")), 7, "integrator.method", "model; choose dopri5"),
     # What is nearly a value with a unit.
     (small("[0.02, 0.05]", "[0.02, 3 rpm]"), 4, "start.n0", "is in sqrt(g/c) here; give the number without rpm"),
-    (small("1500", "20 s"), 5, "integrator.t_end", "is in sqrt(c/g) here; give the number without s"),
     (stone(("mu: 0.5", "mu: 0.5 s/m")), 5, "friction.mu", "is a pure number here; leave out s/m"),
     (stone(("law: coulomb", "law: stribeck, mu_static: 0.4 m")), 5, "friction.mu_static", "not '0.4 m'"),
     (stone(("c: 0.02", "c: 20 g")), 4, "body.c", "not '20 g'; its unit must be m, cm, mm, in or ft"),
@@ -129,10 +121,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (stone(("c: 0.02", "c: [2,5cm, 3cm]")), 4, "body.c", "a comma ends an item of a list; write 2.5cm"),
     (mu("1,5").replace("{mu: 1,5}", "\n  mu: 1,5"), 4, "friction.mu", "not '1,5'; write 1.5 or [1, 5]"),
     (mu("'60'"), 3, "friction.mu", "not '60'; leave out the quotes"),
-    *(
-        (mu(f"'{span}'"), 3, "friction.mu", f"not '{span}'; a range is written {{start: 20, stop: 60, num: 41}}")
-        for span in ("20..60", "20 to 60", "20:60:41")
-    ),
+    (mu("'20 to 60'"), 3, "friction.mu", "not '20 to 60'; a range is written {start: 20, stop: 60, num: 41}"),
     (stone(("c: 0.02", "c: 20cm..30 cm")), 4, "body.c", "; a range is written {start: 20cm, stop: 30 cm, num: 41}, with the number"),
 ]  # fmt: skip
 
@@ -189,12 +178,6 @@ def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> Non
     assert invoke("run", tmp_path / name).stderr == f"{tmp_path / name}: {said}\n"
 
 
-@pytest.mark.parametrize("verb", ["run s3://here/x.yaml", "info s3://here/x.nc", "run {} --output s3://here/out"])
-def test_an_address_is_no_file(verb: str, write: Write) -> None:
-    words = verb.format(write()).split()
-    assert invoke(*words).stderr == f"{words[-1]}: {FAR}\n"
-
-
 def test_an_address_is_no_file_in_python() -> None:
     for call in (sweep.load_config, sweep.open_dataset, sweep.plot, lambda at: sweep.run({}, at, mu=60)):
         with pytest.raises(InputError, match=f"^s3://here/x: {FAR}$"):
@@ -225,7 +208,6 @@ CASES = "name: table\ncases: cells.csv\nstart: {x0: 0.01}\n"
         ("mu,mu\n60,1\n", "cells.csv:1:2: mu", "duplicate column"),
         ("\nmu,detla\n60,1\n", "cells.csv:2:2: detla", "unknown parameter (did you mean delta?)"),
         ("mu,b\n60,wide\n", "cells.csv:2:2: b", "must be a finite number > 0 and < 1e+06, not 'wide'"),
-        ("mu\ninf\n", "cells.csv:2:1: mu", "'inf'"),
         ("mu\n", "cells.csv", "must have 1 to 1000000 rows under its first line, not 0"),
         ("", "cells.csv", "empty; its first line has to name the columns"),
         ("mu,x0\n60,0.01\n", "small.yaml:3:9: start.x0", "is also a column of cells.csv; remove one of the two"),

@@ -142,10 +142,7 @@ def test_a_variable_of_a_dataset_has_the_units_of_its_configuration(write: Write
     [
         ("b", PINT.Quantity(3, "s"), "must be a finite number > 0 and < 1e+06, not '3 s'; its unit must be m, cm"),
         ("b", PINT.Quantity(3, "furlong"), "its unit must be m, cm, mm, in or ft"),
-        ("b", Quantity(3, "kg"), "its unit must be m, cm, mm, in or ft"),
         ("b", xr.DataArray([0.03], attrs={"units": "K"}), "[0]: must be a finite number > 0 and < 1e+06, not '0.03 K'"),
-        ("b", timedelta(seconds=3), "its unit must be m, cm, mm, in or ft"),
-        ("b", np.array([3, 4], "m8[ns]"), "must be a finite number > 0 and < 1e+06, not '3e-09 s'"),
         ("b", np.array(["2001-01-01"], "M8[ns]"), "not '2001-01-01T00:00:00.000000000'"),
         ("b", np.ma.masked_greater([0.03, 0.04], 0.035), "b[1]: must be a finite number > 0 and < 1e+06, not nothing"),
         ("mu", PINT.Quantity(0.5, "m"), "must be a finite number >= 0"),

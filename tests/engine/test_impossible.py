@@ -94,13 +94,6 @@ def test_a_run_grows_by_impossible_bodies(edge: xr.Dataset, write: Write, tmp_pa
     assert found.attrs["impossible"] == edge.attrs["impossible"]
 
 
-def test_parts_of_a_run_know_what_they_hold(edge: xr.Dataset) -> None:
-    """Even if no body of them can be."""
-    part = edge.sel(b=0.9, offset=[1.0])
-    assert "2 impossible" in describe(part)
-    assert "step:" not in "".join(accuracy(part))
-
-
 def test_an_estimate_of_cells_none_of_which_can_be() -> None:
     """So it seems of a large table of which the sample meets no other."""
     offsets = np.ones(10_000)

@@ -100,7 +100,7 @@ def go(browser: Browser, served: str) -> Iterator[Open]:  # noqa: ARG001  whose 
         page.goto(place)
         return page
 
-    with browser.new_context(viewport={"width": 1400, "height": 950}, accept_downloads=True) as context:
+    with browser.new_context(viewport={"width": 1400, "height": 950}) as context:
         context.grant_permissions(["clipboard-read", "clipboard-write"])
         yield opened_at
     assert not complaints
@@ -798,15 +798,6 @@ def test_a_notebook_shows_the_explorer_of_a_dataset(go: Open, opened: xr.Dataset
         shown.close()
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(shown.url, timeout=5)
-
-
-def test_a_figure_is_saved_by_its_toolbar(clicked: Page, tmp_path: Path) -> None:
-    clicked.once("dialog", lambda dialog: dialog.accept("map"))
-    with clicked.expect_download() as download:
-        clicked.locator("#map .bk-tool-icon-save").first.click()
-    download.value.save_as(tmp_path / "map.png")
-    with Image.open(tmp_path / "map.png") as saved:
-        assert saved.size[1] >= 480
 
 
 # ---- texts of a dataset

@@ -80,13 +80,6 @@ def test_without_a_configuration_no_cell_is_taken(source: Source) -> None:
     assert "no configuration" in faults[0]
 
 
-@pytest.mark.parametrize("query", ["show=status&low=1&high=5", "low=1&high=5&show=status"])
-def test_limits_may_stand_before_the_variable(query: str, source: Source, base: state.Cell) -> None:
-    shown, faults = read(query, source, base)
-    assert not faults
-    assert (shown.show, shown.limits) == ("status", {"low": 1, "high": 5})
-
-
 @pytest.mark.parametrize("query", ["x=b", "y=mu", "y=mu&x=b"])
 def test_an_axis_chosen_twice_changes_places(query: str, source: Source, base: state.Cell) -> None:
     shown, faults = read(query, source, base)

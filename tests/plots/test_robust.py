@@ -24,7 +24,6 @@ from sweep.plots import picture, scales
 from sweep.plots.attempt import attempt
 from sweep.results.dataset import REASONS, VARIABLES, described
 from sweep.results.kind import SPINS
-from sweep.results.margins import POINTS
 from sweep.results.probabilities import PROBABILITIES, probabilities
 
 FORMULAS: dict[str, Any] = {"name": "formulas", "friction": {"mu": 60}}
@@ -188,17 +187,6 @@ def test_the_critical_spins_of_one_body_are_seen() -> None:
     assert np.ptp(line.get_xdata()) > 0
 
 
-def test_a_search_without_points_does_not_say_that_counts_are_the_same() -> None:
-    axis = {"actual_range": [1.0, 2.0], "spacing": "linear"}
-    empty = xr.Dataset(
-        {name: ("point", np.zeros(0, int)) for name in POINTS},
-        {name: ("point", np.zeros(0), axis) for name in ("n0", "mu")},
-        {"sweep_kind": "boundaries", "x": "n0", "y": "mu", "trajectories": 0},
-    )
-    (axes,) = picture.plot(empty).axes
-    assert axes.get_title() == "no boundary was found between the cells"
-
-
 def test_dollar_signs_in_the_texts_of_a_dataset_are_written_as_they_are(tmp_path: Path) -> None:
     r"""Matplotlib sets what stands between two as mathematics, and cannot set "\frac{"."""
     text = r"$5 \frac{ $"
@@ -237,15 +225,3 @@ def test_an_error_of_our_own_in_a_drawing_is_not_hidden(tmp_path: Path, monkeypa
         with pytest.raises(TypeError, match="a mistake") if shown else nullcontext():
             attempt(made(), tmp_path / "made.png", notes.append)
     assert len(notes) == 1
-
-
-def test_labels_of_bars_stay_in_the_figure() -> None:
-    """The label of a bar is broken as those of axes are."""
-    long = "spin that is left " * 9
-    dataset = made().assign(spin_final=lambda d: d["spin_final"].assign_attrs(long_name=long))
-    figure = picture.plot(dataset, "spin_final")
-    figure.draw_without_rendering()
-    box = figure.axes[-1].yaxis.label.get_window_extent()
-    assert figure.axes[-1].get_label() == "<colorbar>"
-    assert box.y0 >= 0
-    assert box.y1 <= figure.bbox.y1

@@ -116,10 +116,6 @@ def numbers(*lines: list[Points]) -> list[tuple[float, float, str]]:
     return list(places.words([Line("boundary", "", parts, f"{k}") for k, parts in enumerate(lines, 1)], MU, B))
 
 
-def test_a_number_is_in_the_middle_of_its_line() -> None:
-    assert numbers([across(0.3)]) == [(MU.values[10], 0.3, "1")]
-
-
 def test_numbers_of_close_lines_are_apart() -> None:
     found = numbers(*([across(b)] for b in np.linspace(0.5, 0.51, 8)))
     assert [count for *_, count in found] == list("12345678")

@@ -12,7 +12,6 @@ from support.figures import constants, entries
 
 from sweep.kernels.status import SETTLED, TIME_LIMIT
 from sweep.plots import picture
-from sweep.plots.figure import constants_in_lines
 from sweep.results.dataset import VARIABLES
 from sweep.results.netcdf import open_dataset
 
@@ -72,14 +71,6 @@ def test_a_body_in_si_has_its_units_everywhere() -> None:
     assert entries(figure)[:2] == ["n₀ = −1 rad/s: 1 reversal", "n₀ = 2 rad/s: 2 reversals"]
     assert figure.axes[0].get_ylabel() == "spin n (rad/s)"
     assert (figure.axes[-1].get_title("left"), figure.axes[-1].get_ylabel()) == ("energy per mass", "m²/s²")
-
-
-def test_constants_break_between_them_alone() -> None:
-    constants = "a = 0.2 m, Ixy = −2×10⁻⁵ kg m², gravity = 9.81 m/s²"
-    for width in np.linspace(1.8, 4, 40):
-        lines = constants_in_lines(constants, width).split("\n")
-        assert all(line.endswith(",") for line in lines[:-1])
-        assert " ".join(lines) == constants
 
 
 def test_one_series_is_drawn_alone() -> None:

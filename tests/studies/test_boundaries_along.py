@@ -124,9 +124,3 @@ def test_the_command_resumes_describes_and_draws(tmp_path: Path, found: xr.Datas
     assert line.get_xdata()[[0, -1]].tolist() == [30, 120]
     wide = there.assign(outcome=there.outcome * 0 + WIDE)
     assert "wide bracket: a cell failed or is not certain (4 of 4)" in entries(picture.plot(wide))
-
-
-def test_a_line_without_changes_has_an_empty_picture() -> None:
-    none = sweep.boundaries(BODY, mu=[50.0, 55.0])
-    assert none.sizes["point"] == 0
-    assert "no count changes" in picture.plot(none).axes[0].get_title()
