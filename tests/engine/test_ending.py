@@ -207,7 +207,7 @@ SLOW_RIPPLE = {
 slower period."""
 
 
-@pytest.mark.parametrize("method", ["adams", "dopri5"])
+@pytest.mark.parametrize("method", ["adams", pytest.param("dopri5", marks=pytest.mark.campaign)])
 def test_ripples_of_a_slow_mode_are_not_counted(method: str) -> None:
     cell = {"cases": {name: [value] for name, value in SLOW_RIPPLE.items()} | {"sigma": [2.57275e-6]}}
     found = sweep.run(cell, method=method)

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import sweep
-from sweep.kernels.method import COARSEST, REPEAT
+from sweep.kernels.method import COARSEST, REPEAT, TOLERANCE
 
 NEAR = [(132.0, 3.2, 12), (168.0, 4.6, 17), (180.0, 3.8, 18), (196.0, 4.0, 19), (196.0, 5.0, 21)]
 """μ, b and counts at n0 = 0.1, at tolerances of 1e-8 and 1e-10: of cells whose coarse runs cannot tell."""
@@ -37,13 +37,20 @@ def test_a_count_that_is_clear_is_not_run_again() -> None:
     "settings",
     [
         {"stop_early": False, "t_end": 400},
-        {"estimate_errors": False, "t_end": 400},
-        {"measure": ["reversals", "margin", {"reversal_times": 2}], "t_end": 400},
-        {"measure": ["reversals"], "t_end": 400},
+        {"estimate_errors": False},
+        {"measure": ["reversals", "margin", {"reversal_times": 2}]},
+        {"measure": ["reversals"]},
     ],
 )
 def test_without_certain_counts_auto_is_a_tolerance_of_1e_8(settings: dict) -> None:
-    assert run(FAR, **settings).equals(run(FAR, tolerance=1e-8, **settings))
+    scene = {"friction": {"mu": 60.0}}
+    assert sweep.load_config(scene).tolerance == COARSEST
+    assert sweep.load_config(scene, settings).tolerance == TOLERANCE == 1e-8
+
+
+def test_a_run_to_the_end_of_the_time_takes_the_tolerance_of_its_configuration() -> None:
+    found, fine = (run(FAR, stop_early=False, t_end=400, **given) for given in ({}, {"tolerance": 1e-8}))
+    assert found.equals(fine)
 
 
 def test_the_dataset_says_what_the_tolerance_was() -> None:

@@ -186,6 +186,7 @@ def test_a_start_by_angles_and_rates_is_estimated() -> None:
     assert right[certain & (found.estimate_certain.values == 1)].all()
 
 
+@pytest.mark.campaign
 def test_a_body_in_si_has_the_same_counts() -> None:
     """Given by lengths and times, with gravity, where the equations are those of another variant."""
     paper = sweep.run(LINE | {"model": "slow"})
