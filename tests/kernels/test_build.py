@@ -171,7 +171,7 @@ def test_processes_end_with_the_one_that_started_them(
     assert shown[1:] == ["interrupted: no cells finished and kept; the same command resumes the run"][: len(shown) - 1]
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 def test_counts_are_estimated_alike_by_the_process_that_compiles(tmp_path: Path) -> None:
     """High counts, some of which depend on the last bits."""
     program = """

@@ -33,7 +33,7 @@ print(next(iter(add.inspect_asm().values())))
     assert ("zmm" in assembly) == wide
 
 
-@pytest.mark.campaign
+@pytest.mark.release
 @pytest.mark.skipif(not llvm.get_host_cpu_features().get("avx512f"), reason="the CPU has no wider vectors to compare")
 def test_the_same_bits_in_narrower_vectors(tmp_path: Path) -> None:
     code = f"""

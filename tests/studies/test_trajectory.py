@@ -29,7 +29,7 @@ BOWL = {
     **STONE, "body": {"surface": "paraboloid", "a": 0.1, "b": 0.3, "c": 0.02, "offset": 0.005, "mass": 0.5,
                       "Ixx": 1e-4, "Iyy": 5e-4, "Izz": 5.5e-4, "Ixy": 3e-5},
 }  # fmt: skip
-FAR_UP = BOWL | {"friction": {"mu": 20, "sigma": 1e-4}, "start": {"n0": -5, "x0": 0.04, "y0": 0.004}}
+FAR_UP = BOWL | {"friction": {"mu": 20}, "start": {"n0": -5, "x0": 0.04, "y0": 0.004}}
 """It starts from a contact point far up its sides, where it differs from the ellipsoid of the same curvatures."""
 SLIDING = STONE | {"start": STONE["start"] | {"slip1": 0.2}}
 DRY = SLIDING | {"friction": {"law": "coulomb", "mu": 0.5, "speed": 0.02, "sigma": 1e-4}}
