@@ -8,7 +8,7 @@ smoothly.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
@@ -45,12 +45,18 @@ class MapFigure:
     """The map over two axes, which shows one slice after another.
 
     The models stay the same from slice to slice, because a browser keeps models that are replaced.
+
+    Parameters
+    ----------
+    x, y : the axes
+    first : index along each axis of the cell that the cuts go through until another one is pointed at or chosen; by
+        default the middle one
     """
 
     _look: tuple[Any, ...] = ()
     """Everything that bar, cuts and tooltips were last labelled for."""
 
-    def __init__(self, source: Source, x: str, y: str) -> None:
+    def __init__(self, source: Source, x: str, y: str, first: Mapping[str, int] | None = None) -> None:
         self._source, self.axes = source, (x, y)
         self._x, self._y = (source.axes.get(axis, PlacedAxis("", np.zeros(1))) for axis in (x, y))
         self.placed = self._x, self._y
@@ -88,6 +94,7 @@ class MapFigure:
                  "tiles": [{"side": len(tile), "colours": tile.ravel()} for tile in TILES.values()],
                  "ex": ex, "ey": ey, "cursor": cursor, "probe": self.probe, "request": self.request,
                  "cells": self._cells, "cuts": self._cuts,
+                 "first": [(first or {}).get(name, (len(edges) - 1) // 2) for name, edges in ((x, ex), (y, ey))],
                  "blank": sum(1 << list(TILES).index(kind) for kind in marks.BLANK)})  # fmt: skip
 
     def show(self, state: State, other: xr.Dataset | None = None) -> tuple[Map, Scale]:

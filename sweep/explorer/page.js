@@ -98,8 +98,8 @@ const sweep = (() => {
 
   /** Draw the values of the row and of the column of a cell; with cells without a value, there are gaps. */
   function cut(i, j) {
-    const {cuts, cells, blank, ex, ey} = current
-    if (i < 0 || j < 0) [i, j] = [(ex.length - 1) >> 1, (ey.length - 1) >> 1]
+    const {cuts, cells, blank, ex, first} = current
+    if (i < 0 || j < 0) [i, j] = first
     current.cut = [i, j]
     const {image: [values], kinds: [bits]} = cells.data, across = ex.length - 1
     cuts.forEach(({plot, at}, n) => {

@@ -132,7 +132,7 @@ class View:
 
     def _draw_map(self) -> None:
         if not self._map.children or self._shown.axes != (self.state.x, self.state.y):
-            self._shown = figure.MapFigure(self._source, self.state.x, self.state.y)
+            self._shown = figure.MapFigure(self._source, self.state.x, self.state.y, self._first)
             self._map.children = [self._shown.figure, self._shown.cuts]
             controls.on(self._shown.probe, "data", lambda _: self._point())
             controls.on(self._shown.request, "data", lambda _: self._requested())

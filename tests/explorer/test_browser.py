@@ -568,6 +568,8 @@ def test_at_first_sight_a_trajectory_runs_and_its_body_turns(go: Open, served: s
     cell = page.locator("#cell")
     assert cell.get_by_text("spin reversals, simulated").count() == 1
     assert int(text(page, "cell").split("spin reversals, simulated")[1].split()[0]) > 0
+    for name in ("b", "mu"):
+        assert model(page, f"cut along {name}", "m.title.text").removeprefix("at ") in text(page, "cell")
     rows = cell.locator("tr")
     assert rows.count() > 10
     assert sum(rows.nth(k).is_visible() for k in range(rows.count())) == 5
