@@ -81,8 +81,8 @@ def trajectory(
     """Follow single cells of CONFIG, or those of --at, over time.
 
     They run to t_end of CONFIG. Writes NAME_trajectory.nc and .png: spin with reversals and critical spins, contact
-    point, slip, normal force, energy and the work of friction. Several trajectories share one set of panels; for
-    samples, only the spins are drawn.
+    point, accelerations, normal force, energy and the work of friction. Several trajectories share one set of panels;
+    for samples, only the spins are drawn.
     """
     from sweep.config import values_at
 
