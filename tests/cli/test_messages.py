@@ -77,7 +77,7 @@ def test_a_whole_number_may_be_written_as_any_number(number: str, write: Write) 
 
 @pytest.mark.parametrize(
     "command",
-    ["info quick.nc", "run quick.yaml --dry-run", "run quick.yaml --output . --fresh 2>&1"],
+    ["info quick.nc", "run quick.yaml --output . --fresh 2>&1"],
 )
 def test_a_closed_pipe_ends_a_command_silently(command: str, tmp_path: Path) -> None:
     """As `… | head` does once it has what it wants; also one that shows its progress there."""

@@ -1,7 +1,9 @@
 """A run that has grown simulates only what is missing, and ends with the dataset of a run of all cells at once."""
 
 import re
+import shutil
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ import pytest
 import xarray as xr
 from support import Write
 from support.physics import TURNS, stone
-from support.runs import Heard, Stop, same_numbers
+from support.runs import Heard, Stop, nothing_drawn, same_numbers
 
 import sweep
 from sweep import FileError
@@ -19,6 +21,8 @@ from sweep.engine.enlarged import taken_over
 from sweep.kernels.status import SETTLED
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
+
+Files = Callable[[str, Path], Path]
 
 BODY = "name: small\nbody: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}\n"
 ONE = BODY + "friction: {mu: [40, 60]}\nstart: {n0: [0.02, 0.05], x0: 0.01, y0: 0.01}\n"
@@ -34,6 +38,20 @@ def grown(write: Write, output: Path, *texts: str, **options: Any) -> tuple[xr.D
         reporter = Heard()
         found = sweep.run(write(text), output, progress=reporter, **options)
     return found, reporter.notes
+
+
+@pytest.fixture(scope="module")
+def files(kept: Write, tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """Copies the files of a run of some configuration, which is run once, to a folder."""
+
+    @cache
+    def ran(text: str) -> Path:
+        folder = tmp_path_factory.mktemp("ran")
+        with nothing_drawn():
+            sweep.run(kept(text), folder)
+        return folder
+
+    return lambda text, folder: Path(shutil.copytree(ran(text), folder))
 
 
 SCENE = "name: small\n" + stone(
@@ -75,9 +93,9 @@ GROWN = {
 
 @pytest.mark.parametrize(("first", "later", "taken"), GROWN.values(), ids=GROWN)
 def test_a_grown_run_is_the_run_of_all_at_once(
-    write: Write, tmp_path: Path, first: str, later: str, taken: str
+    write: Write, files: Files, tmp_path: Path, first: str, later: str, taken: str
 ) -> None:
-    found, (note,) = grown(write, tmp_path / "out", first, later)
+    found, (note,) = grown(write, files(first, tmp_path / "out"), later)
     assert re.match("no cell of the run" if taken == "no" else f"{taken} cells are reused", note)
     assert found.attrs.get("taken_over", note) in note
     same_numbers(found, sweep.run(write(later)))
@@ -94,8 +112,8 @@ def test_a_longer_table_of_cases(write: Write, tmp_path: Path) -> None:
     same_numbers(found, sweep.run(write(CASES)))
 
 
-def test_what_is_taken_over_is_not_computed_again(write: Write, tmp_path: Path) -> None:
-    grown(write, tmp_path / "out", ONE)
+def test_what_is_taken_over_is_not_computed_again(write: Write, files: Files, tmp_path: Path) -> None:
+    files(ONE, tmp_path / "out")
     with netCDF4.Dataset(tmp_path / "out" / "small.nc", "a") as file:
         file["reversals"][1, 2, 0] = 77
     found, _ = grown(write, tmp_path / "out", MORE)
@@ -127,8 +145,8 @@ def test_what_adams_foresaw_is_not_taken_over(write: Write) -> None:
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> None:
-    grown(write, tmp_path / "out", ONE)
+def test_an_interrupted_enlargement_goes_on(write: Write, files: Files, tmp_path: Path) -> None:
+    files(ONE, tmp_path / "out")
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
             sweep.run(write(LATER), tmp_path / "out", progress=Stop(2))
@@ -152,8 +170,8 @@ def test_an_interrupted_enlargement_goes_on(write: Write, tmp_path: Path) -> Non
         (("integrator", "measure: [reversals]\nintegrator"), "- measure:"),
     ],
 )
-def test_no_result_is_lost(write: Write, tmp_path: Path, change: tuple[str, str], said: str) -> None:
-    grown(write, tmp_path / "out", ONE)
+def test_no_result_is_lost(write: Write, files: Files, tmp_path: Path, change: tuple[str, str], said: str) -> None:
+    files(ONE, tmp_path / "out")
     before = (tmp_path / "out" / "small.nc").read_bytes()
     with pytest.raises(FileError, match="not resumed") as caught:
         grown(write, tmp_path / "out", ONE.replace(*change))
@@ -173,33 +191,35 @@ EDITS: dict[str, Callable[[xr.Dataset], xr.Dataset]] = {
 
 
 @pytest.mark.parametrize("how", EDITS)
-def test_nothing_is_taken_from_an_edited_dataset(how: str, write: Write, tmp_path: Path) -> None:
+def test_nothing_is_taken_from_an_edited_dataset(how: str, write: Write, files: Files, tmp_path: Path) -> None:
     """A count that is not there was taken for zero."""
     text = by("dopri5", ONE) + MEASURED
-    there, _ = grown(write, tmp_path / "out", text)
+    there = sweep.open_dataset(files(text, tmp_path / "out") / "small.nc")
     EDITS[how](there).to_netcdf(tmp_path / "out" / "small.nc")
     with pytest.raises(FileError, match=r"edited since|another configuration"):
         grown(write, tmp_path / "out", text, n0=[0.02, 0.03, 0.05])
 
 
-def test_a_part_of_a_dataset_is_no_complete_run(write: Write, tmp_path: Path) -> None:
-    there, _ = grown(write, tmp_path / "out", by("dopri5", ONE))
+def test_a_part_of_a_dataset_is_no_complete_run(write: Write, files: Files, tmp_path: Path) -> None:
+    there = sweep.open_dataset(files(by("dopri5", ONE), tmp_path / "out") / "small.nc")
     there.isel(mu=[0]).to_netcdf(tmp_path / "out" / "small.nc")
     found, notes = grown(write, tmp_path / "out", by("dopri5", ONE))
     assert notes[0].startswith("6 of 12 cells are reused")
     same_numbers(found, there)
 
 
-def test_nothing_is_taken_from_other_sources(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    grown(write, tmp_path / "out", ONE)
+def test_nothing_is_taken_from_other_sources(
+    write: Write, files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files(ONE, tmp_path / "out")
     monkeypatch.setattr("sweep.results.provenance.sources", lambda: ("other", "versions"))
     with pytest.raises(FileError, match="not resumed"):
         grown(write, tmp_path / "out", MORE)
 
 
-def test_a_scene_does_not_grow_into_another(write: Write, tmp_path: Path) -> None:
+def test_a_scene_does_not_grow_into_another(write: Write, files: Files, tmp_path: Path) -> None:
     """Neither another value of an axis nor another law, couple or kind of start may take over a cell."""
-    grown(write, tmp_path / "out", SCENE)
+    files(SCENE, tmp_path / "out")
     changes = (("9.81", "1.62"), ("0.02, sigma", "0.03, sigma"), (", sigma: 1.0e-4", ""),
                ("law: coulomb", "law: contensou, radius_contact: 1.0e-3"),
                ("roll: 0.5 deg, pitch: 1 deg, omega3: [-5, 5]", "n0: [-5, 5], x0: 1.0e-3, y0: 0"))  # fmt: skip

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import ENDS, columns, newton
+from support import ENDED, ENDS, columns, newton
 
 from sweep.kernels.failure import approach
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
@@ -24,6 +24,7 @@ def test_failures_with_their_times_and_spins(kind: int) -> None:
     body = columns(**ENDS[kind])
     (status,), (time,), (spin,), (doubt,) = met(body, 5.0)
     expected, expected_spin, height, force, determinant = newton.end(**ENDS[kind], t_end=5.0)
+    assert (expected, expected_spin) == pytest.approx(ENDED[kind], abs=1e-9)
     assert status == kind
     assert time == pytest.approx(expected, abs=1e-7)
     assert spin == pytest.approx(expected_spin, abs=3e-9 + 3 * doubt)

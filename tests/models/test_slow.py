@@ -305,6 +305,7 @@ def test_elementary_functions_are_those_of_numpy() -> None:
 
 
 @pytest.mark.x86
+@pytest.mark.campaign
 def test_the_steps_are_vector_instructions() -> None:
     made = compiled(follow.make_follow())
     made.compile(slow.compiled_follow()._types)

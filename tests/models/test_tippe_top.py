@@ -82,6 +82,7 @@ def test_a_tippe_top_turns_over_completely_if_its_moments_are_in_the_published_r
     assert ends["reversals"].values.tolist() == [0, 1, 1, 1]
 
 
+@pytest.mark.campaign
 def test_the_map_shows_where_it_turns_over() -> None:
     """Fast tops turn over from α = 1 - A/C on, slow ones never: upright spin is stable for them."""
     counts = sweep.run(CONFIG, eccentricity=[0.04, 0.055, 0.08, 0.2, 0.3], n0=[1.0, 7.0])["reversals"]

@@ -26,6 +26,13 @@ ENDS = {
 }
 """Bodies and starts by how they end."""
 
+ENDED = {
+    TOPPLED: (1.98151077087, 0.850367779047),
+    LIFT_OFF: (0.309325995245, 0.594084511578),
+    PARADOX: (2.60774091287, -0.981004030229),
+}
+"""When and with which spin: `newton.end`, seconds of work, which `kernels/test_failure.py` runs."""
+
 SMALL = """\
 name: small
 body: {a: 10.0, b: [2.0, 3.0, 5.0], delta: 0.03}

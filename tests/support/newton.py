@@ -4,7 +4,6 @@ Nothing is solved by hand, and mass, gravity and couples enter as they are.  The
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -231,7 +230,6 @@ def _unit(u: Vector) -> Vector:
     return u / np.sqrt(u @ u)
 
 
-@cache
 def end(*, t_end: float, n0: float, x0: float, y0: float, **p: float) -> tuple[float, float, float, float, float]:
     """When and how a trajectory of the paper's body ends: time and spin, and then u3², normal force and determinant.
 
