@@ -108,8 +108,17 @@ _VARYING = re.compile(
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize("page", [page for page in PAGES if page.stem not in _LOOKED_AT], ids=_name)
+_LONG = {"boundaries"}
+"""A page whose searches take more than a minute; `tests/studies/test_boundaries.py` has shorter ones."""
+
+_RENEWED = [
+    pytest.param(page, marks=pytest.mark.release if page.stem in _LONG else pytest.mark.campaign, id=_name(page))
+    for page in PAGES
+    if page.stem not in _LOOKED_AT
+]
+
+
+@pytest.mark.parametrize("page", _RENEWED)
 def test_what_a_page_shows_is_what_its_code_gives(page: Path, tmp_path: Path) -> None:
     """To renew it: `python docs/renew.py PAGE`."""
     text = RENEW["renewed"](page, tmp_path)
