@@ -61,12 +61,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 LIGHT = ("config", "cli", "explorer", "plots", "results")
-"""Folders whose files take seconds."""
+"""Folders whose files take seconds, but for those in a browser."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run light files last, so that no process waits long for another; skip instructions of x86 CPUs on others."""
-    items.sort(key=lambda item: item.path.parent.name in LIGHT)
+    items.sort(key=lambda item: item.path.parent.name in LIGHT and not item.get_closest_marker("browser"))
     if platform.machine().lower() not in ("x86_64", "amd64"):
         for item in items:
             if item.get_closest_marker("x86"):
