@@ -315,46 +315,30 @@ class Machine(RuleBasedStateMachine):
     @rule(number=NUMBER, ways=st.sets(st.sampled_from(["t_end", "axis", "samples", "measure", "name"]), min_size=1))
     def grow(self, number: int, ways: set[str]) -> None:
         """A run over the dataset of a smaller one, or of a shorter one, is that of all cells at once."""
-        random, integrator = Random(number), self.config.integrator
+        random, integrator, folder = Random(number), self.config.integrator, self._new()
         larger: Flat = {
             "name": "x", "integrator.t_end": integrator.t_end, "integrator.stop_early": integrator.stop_early
         }  # fmt: skip
-        smaller, folder = dict(larger), self._new()
-        of_way = {
-            "t_end": self._shorter, "samples": self._fewer_samples, "measure": self._fewer_measurements,
-            "axis": self._fewer_values,
-        }  # fmt: skip
-        for change in (change for way, change in of_way.items() if way in ways):
-            less, more = change(random)
-            smaller, larger = smaller | less, larger | more
+        smaller = dict(larger)
+        if "t_end" in ways:
+            smaller["integrator.t_end"] = integrator.t_end / random.choice((1.3, 2, 10))
+        if "samples" in ways and self.config.samples:
+            smaller["samples"], larger["samples"] = random.choice((1, 2, 3)), 4
+        if "measure" in ways and not self.config.picture:  # a picture may need what is left out
+            first = [each for each in self.config.document()["measure"] if each in ("reversals", "margin")][:1]
+            if self._allowed(self.scene.with_({"measure": first})):
+                smaller["measure"] = first
+        if "axis" in ways and self.config.axes:  # some values, then all of them and one more, in any order
+            name, known = random.choice([*self.config.axes.items()])
+            values = [*random.sample(known, len(known)), float(np.mean(known)) * 1.001 or 1e-6]
+            path = self.config.table[name].path
+            smaller[path] = values[random.randrange(len(values)) :]
+            larger[path] = random.sample(values, len(values))
         if all(self._allowed(self.scene.with_(changes)) for changes in (smaller, larger)):
             self._run(self.scene.with_(smaller), folder)
             found = self._run(self.scene.with_(larger), folder)
             same_numbers(found, self._run(self.scene.with_(larger)))
             self.others.append(found)
-
-    # What is changed in the smaller run, and in the larger one.
-
-    def _shorter(self, random: Random) -> tuple[Flat, Flat]:
-        return {"integrator.t_end": self.config.integrator.t_end / random.choice((1.3, 2, 10))}, {}
-
-    def _fewer_samples(self, random: Random) -> tuple[Flat, Flat]:
-        return ({"samples": random.choice((1, 2, 3))}, {"samples": 4}) if self.config.samples else ({}, {})
-
-    def _fewer_measurements(self, _: Random) -> tuple[Flat, Flat]:
-        first = [each for each in self.config.document()["measure"] if each in ("reversals", "margin")][:1]
-        # A picture may need what is left out.
-        left = not self.config.picture and self._allowed(self.scene.with_({"measure": first}))
-        return {"measure": first} if left else {}, {}
-
-    def _fewer_values(self, random: Random) -> tuple[Flat, Flat]:
-        """Some values of an axis, then all of them and one more, in any order."""
-        if not self.config.axes:
-            return {}, {}
-        name, known = random.choice([*self.config.axes.items()])
-        values = [*random.sample(known, len(known)), float(np.mean(known)) * 1.001 or 1e-6]
-        path, some = self.config.table[name].path, values[random.randrange(len(values)) :]
-        return {path: some}, {path: random.sample(values, len(values))}
 
     @rule(drawn=several(asked_of(["run", "run", *STUDIES], words.TAKEN, 2)), chunks=st.integers(0, 3))
     def interrupted(self, drawn: list[Asked], chunks: int) -> None:
