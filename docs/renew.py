@@ -130,7 +130,9 @@ def _draw(source: str, target: Path) -> None:
     else:
         shutil.copy(source, target)
     if target.suffix == ".png" and source != "explorer":  # whose greys would turn pink
-        few = Image.open(target).convert("RGB").quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        all_colours = Image.open(target).convert("RGB")
+        # A step of k-means gives each group of colours its own mean, and the cells of a map their own colour.
+        few = all_colours.quantize(method=Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE)
         few.save(target, optimize=True)  # a third as large
 
 
