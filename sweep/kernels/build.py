@@ -26,7 +26,7 @@ from pathlib import Path
 
 from sweep.faults import CompileError
 from sweep.interrupt import point
-from sweep.jit import Cached, compiled, compiling, load_numba, threads
+from sweep.jit import Cached, compile_for_disk, compiled, compiling, load_numba, threads
 from sweep.kernels.failure import compiled_approach
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.methods import METHODS, PLAIN, make_kernel
@@ -189,6 +189,7 @@ def main(piece: str, method: str, name: str, *measure: str) -> None:
     else:
         model = find(name)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    compile_for_disk()
     gc.disable()  # the garbage collector's search for cycles takes a twentieth of the time
     try:
         for function in _PIECES[piece](make_kernel(method, model, measure)):
