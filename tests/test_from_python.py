@@ -3,9 +3,7 @@
 import sys
 import types
 from collections.abc import Callable
-from contextlib import nullcontext
 from dataclasses import replace
-from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -184,22 +182,6 @@ def test_a_notebook_shows_progress_unasked_and_others_where_it_is_asked_for(
     sweep.run(SAID, **asked)
     out, err = capfd.readouterr()
     assert (out, "4/4 cells" in err, bool(err)) == ("", shown, shown)
-
-
-def test_a_notebook_with_widgets_shows_a_bar_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown = list[object]()
-
-    class Output(nullcontext[None]):
-        clear_output = staticmethod(lambda wait: None)  # noqa: ARG005
-
-    given = {"Output": Output, "display": shown.append, "get_ipython": lambda: types.SimpleNamespace(kernel=None)}
-    for name in ("IPython", "ipywidgets", "IPython.display"):
-        module = types.ModuleType(name)
-        module.__spec__ = ModuleSpec(name, None)
-        vars(module).update(given)
-        monkeypatch.setitem(sys.modules, name, module)
-    sweep.run(SAID)
-    assert isinstance(shown[0], Output)
 
 
 def test_parts_of_a_grid_are_combined_without_loss(tmp_path: Path) -> None:

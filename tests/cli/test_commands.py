@@ -1,6 +1,5 @@
 """The commands run, info and plot: what they write, say and return."""
 
-import io
 import os
 import subprocess
 import sys
@@ -9,14 +8,12 @@ from unittest.mock import Mock
 
 import pytest
 import xarray as xr
-from rich.console import Console
 from support import Write
 from support.cli import invoke, refused
 from support.runs import same_numbers
 
 import sweep
-from sweep.jit import Cached, compiling
-from sweep.progress import Terminal
+from sweep.jit import Cached
 
 
 def test_command_writes_dataset_and_maps(write: Write, tmp_path: Path, small: xr.Dataset) -> None:
@@ -125,15 +122,3 @@ def test_a_command_says_once_that_it_compiles(command: list[str], lines: int, wr
 def test_python_compiles_without_a_word(write: Write, capfd: pytest.CaptureFixture[str]) -> None:
     sweep.run(write("model: averaged\nfriction: {mu: 60}\nintegrator: {t_end: 5}\n"))
     assert tuple(capfd.readouterr()) == ("", "")
-
-
-def test_a_spinner_turns_on_a_terminal_while_something_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TERM", "xterm")
-    screen = io.StringIO()
-    with Terminal() as terminal:
-        terminal.console = Console(file=screen, force_terminal=True)
-        with compiling():
-            pass
-    text = screen.getvalue()
-    assert "compiling for this model and machine" in text
-    assert text.endswith("\x1b[2K")  # the line is wiped

@@ -47,14 +47,6 @@ def test_a_refusal_says_what_may_be_meant(command: str, write: Write, tmp_path: 
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("character", ["\udcff", "\0", "\U000e0001"])
-def test_what_cannot_be_printed_is_quoted_as_short_as_any_other(character: str, write: Write) -> None:
-    """Such a character takes up to ten in print, of which 300 once filled a screen."""
-    result = invoke("trajectory", write(TEXT), "--at", f"{character * 300}=1")
-    assert result.exit_code == 2
-    assert len(result.stderr) < 700, result.stderr
-
-
 @pytest.mark.parametrize(
     ("text", "range_"),
     [
@@ -103,23 +95,6 @@ def test_a_command_reports_what_it_wrote(write: Write, tmp_path: Path) -> None:
     out.with_suffix(".png").unlink()
     assert invoke(*command).stdout.endswith(f"\nwrote {out}.png\n")
     assert invoke(*command, "--fresh").stdout.endswith(f"\nwrote {out}.nc and .png\n")
-
-
-@pytest.mark.parametrize("unit", ["cells", "bodies", "sqrt(c/g)"])
-@pytest.mark.parametrize("width", [30, 40, 60, 79, 80, 200])
-def test_a_terminal_of_any_width_keeps_the_bar(width: int, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", str(width))
-    screen = io.StringIO()
-    terminal = Terminal()
-    assert terminal.console.width == width
-    terminal.chunk(Progress(6072, 3036, 0, 0, 10.0, unit))
-    terminal._bar.stop()
-    Console(file=screen, width=width).print(terminal._bar.get_renderable())
-    (line,) = screen.getvalue().splitlines()
-    assert len(line) <= width
-    assert "3036/6072" in line
-    assert 2 <= line.count("━") < 40
-    assert (unit in line) == (width >= 80)
 
 
 def test_a_log_reports_now_and_then_how_far_a_run_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,14 +62,6 @@ def test_every_exception_is_needed() -> None:
         assert {*alone} <= differences[verb], verb
 
 
-def test_name_and_value_are_written_in_one_way() -> None:
-    """By --at and --set, with the same words in every verb that has them."""
-    options = [each for command in main.commands.values() for each in command.params]
-    pairs = {max(each.opts, key=len) for each in options if "=" in (each.metavar or "")}
-    assert pairs == {"--at", "--set"}
-    assert {each.metavar for each in options if {"--at", "--set"} & {*each.opts}} == {"NAME=VALUE"}
-
-
 def test_cells_and_settings_are_keywords_alike() -> None:
     for verb in VERBS:
         arguments = signature(getattr(sweep, verb)).parameters

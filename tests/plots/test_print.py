@@ -14,7 +14,6 @@ from support.cli import invoke, refused
 from support.figures import entries, made
 
 from sweep.faults import InputError
-from sweep.kernels.status import DIVERGED, IMPOSSIBLE, LIFT_OFF, TIME_LIMIT, Doubt
 from sweep.plots import picture
 from sweep.results.netcdf import open_dataset, write
 
@@ -62,23 +61,6 @@ def test_a_figure_for_a_column_has_one_bar_and_is_no_page(starts: int, variable:
     assert len({axes.get_subplotspec().colspan.start for axes in panels}) == min(starts, 3)
     assert figure.get_figheight() * 25.4 < 130
     assert min(axes.bbox.width for axes in panels) > 14 / 25.4 * figure.dpi
-
-
-@pytest.mark.parametrize("marked", [3, 6])
-def test_a_legend_has_few_rows(marked: int) -> None:
-    """With all four lines, and with some or nearly all kinds of cell at once."""
-    one = made()
-    one["margin_more"], one["margin_fewer"] = 0 * one["spin_final"] + 0.5, 0 * one["spin_final"] + 0.5
-    one["doubts"].values[6, :2, 0] = Doubt.ROUND_OFF, Doubt.STEP
-    if marked > 3:
-        one["status"].values[:5, 0, 0] = [0, LIFT_OFF, DIVERGED, IMPOSSIBLE, TIME_LIMIT]
-    figure = picture.plot(one, "reversals", width="180mm")
-    drawn = entries(figure)
-    assert len(drawn) == marked + 4
-    (legend,) = figure.legends
-    assert -(-len(drawn) // legend._ncols) <= (3 if marked == 3 else 4)
-    figure.draw_without_rendering()
-    assert legend.get_window_extent().width <= figure.bbox.width
 
 
 @pytest.mark.parametrize("width", ["85mm", "180mm", None])
