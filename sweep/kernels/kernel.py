@@ -231,7 +231,7 @@ class Kernel:
 
     def initial(self, columns: Columns, stable: StableRanges | None = None) -> Array:
         """Return the state rows of trajectories at t = 0 that have no steps yet; parameters as of `start`."""
-        cells = len(columns["a"])
+        cells = len(next(iter(columns.values())))
         table = self.table(np.zeros((cells, len(self.layout.names))))
         if not cells:
             return table.rows
