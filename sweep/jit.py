@@ -20,6 +20,7 @@ from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock, RLock, current_thread
+from traceback import walk_tb
 from types import FunctionType
 from typing import Any
 
@@ -294,12 +295,15 @@ _FILE = re.compile(r'File "(.+?)", line (\d+)')
 def compiler_said(error: Exception) -> tuple[list[tuple[str, int]], str]:
     """Return the places, as file and line, that an error of Numba's compiler names, and why it failed.
 
-    An error of anything else has no places and no reason.
+    What Python raises while Numba infers a type, such as for a function that NumPy lacks, counts as one. An error of
+    anything else has no places and no reason.
     """
     if isinstance(error, CompileError):
         return [*error.places], error.reason
     if not type(error).__module__.startswith("numba"):
-        return [], ""
+        held = (frame.f_locals.get("constraint") for frame, _ in walk_tb(error.__traceback__))
+        places = [(at.filename, at.line) for each in held if (at := getattr(each, "loc", None))]
+        return places, str(error) if places else ""
     where = getattr(error, "loc", None)
     places = [(where.filename, where.line)] if where else []
     places += [(file, int(line)) for file, line in _FILE.findall(str(error))]

@@ -195,7 +195,7 @@ def at_equal_error(found: list[Measured]) -> Table:
     lines = [["slip", *head, *(f"{method}: times faster" for method in faster)]]
     for case, costs in best.items():
         ratios = (costs[methods.PLAIN] / costs[method] for method in faster)
-        lines.append([case, *(f"{x:.3g}" if np.isfinite(x) else "—" for x in (*costs.values(), *ratios))])
+        lines.append([case, *(f"{x:.3g}" if 0 < x < np.inf else "—" for x in (*costs.values(), *ratios))])
     return f"The slip model at equal error: the cheapest step with an error up to {BOUND:g}", lines
 
 

@@ -126,11 +126,12 @@ def _of_integrator(config: Config) -> Iterator[Misfit]:
     model, integrator = config.tier, config.integrator
     if not isinstance(model, Model):
         return
-    usable = (*methods.allowed(model, config.measure), methods.AUTO)
-    if integrator.method not in usable:
+    usable = methods.allowed(model, config.measure)
+    if usable and integrator.method not in (*usable, methods.AUTO):  # without any, a measurement is refused
         able = integrator.method in methods.allowed(model)
         cannot = f"make all of {', '.join(config.measure)} on" if able else "run"
-        yield ("integrator", "method"), f"cannot {cannot} the {model.name} model; choose {either(usable)}"
+        choice = either((*usable, methods.AUTO))
+        yield ("integrator", "method"), f"cannot {cannot} the {model.name} model; choose {choice}"
     if integrator.method == methods.AUTO and integrator.step != "auto":
         yield ("integrator", "step"), "must be auto with method: auto; or choose a method"
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from traceback import extract_stack
 from typing import Any
 
+from sweep.faults import CompileError, suggestion
 from sweep.jit import INTERPRETED
 from sweep.models.model import Array, Model
 from sweep.models.theory.stability import StableRanges
@@ -45,7 +47,17 @@ class Layout:
         return name in self.names
 
     def index(self, name: str) -> int:
-        """Index of a quantity: its column in the table of state rows, and its row in a group."""
+        """Index of a quantity: its column in the table of state rows, and its row in a group.
+
+        Raises
+        ------
+        CompileError
+            if there is none of this name; it gives the place of whoever asked.
+        """
+        if name not in self.names:
+            asked = next(each for each in reversed(extract_stack()) if each.filename != __file__)
+            reason = f"no quantity {name!r} in the state rows{suggestion(name, self.names)}"
+            raise CompileError([(asked.filename, asked.lineno or 1)], reason)
         return self.names.index(name)
 
     def at(self, name: str) -> int:

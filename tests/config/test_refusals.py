@@ -13,6 +13,7 @@ from sweep import InputError, load_config
 from sweep.faults import either, fault_of
 from sweep.kernels.methods import AUTO, METHODS
 from sweep.models import TIERS
+from sweep.plots.quantities import DERIVED
 
 
 def small(old: str, new: str) -> str:
@@ -72,7 +73,7 @@ BROKEN: list[tuple[str, int, str, str]] = [
     (SMALL + "measure: [{reversal_times: 3}]\n", 6, "measure[0]", "reversal_times is measured with the reversals; add reversals"),
     *((SMALL + f"measure: [reversals, {{reversal_times: {n}}}]\n", 6, "measure[1].reversal_times", f"must be a whole number from 1 to 1000, not {n}") for n in (0, 2.5)),
     (SMALL + "measure: [reversals, {energy_error: 3}]\n", 6, "measure[1]", "energy_error has no settings; write only the name"),
-    (SMALL + "picture: [status, spn_mean]\n", 6, "picture[1]", "must be a variable, such as difference, ratio or t_first_reversal, not 'spn_mean' (did you mean spin_mean?)"),
+    (SMALL + "picture: [status, spn_mean]\n", 6, "picture[1]", f"must be a variable, such as {either(sorted(DERIVED))}, not 'spn_mean' (did you mean spin_mean?)"),
     (SMALL + "picture: [ratio]\n", 6, "picture[0]", "ratio is not measured; add reversal_times to measure"),
     (SMALL + "picture: [status, status]\n", 6, "picture[1]", "status appears twice; name each once"),
     (SMALL + "max_failed_fraction: 2\n", 6, "max_failed_fraction", "must be a finite number >= 0 and <= 1, not 2"),

@@ -78,14 +78,27 @@ def edit(file: Path, old: str, new: str) -> None:
 
 
 @pytest.mark.campaign
-def test_a_typo_in_a_hook_is_named_in_two_lines(copy: Path) -> None:
+@pytest.mark.parametrize(
+    ("place", "typed", "named"),
+    [
+        ("        def check(group, lane, seen):", "            gruop[0] = 1.0", "gruop"),
+        ("        def check(group, lane, seen):", "            group[lane] = np.nosuch(seen.spin)", "nosuch"),
+        (
+            "    def make_check(self, layout: Layout):",
+            '        layout.at("dnoe")',
+            "'dnoe' in the state rows (did you mean done?)",
+        ),
+    ],
+    ids=["name", "function", "quantity"],
+)
+def test_a_typo_in_a_hook_is_named_in_two_lines(place: str, typed: str, named: str, copy: Path, tmp_path: Path) -> None:
     margin = copy / "sweep" / "kernels" / "measures" / "margin.py"
-    lines = margin.read_text(encoding="utf-8").splitlines()
-    line = lines.index("        def check(group, lane, seen):") + 2
-    lines.insert(line - 1, "            gruop[0] = 1.0")
+    lines = (ROOT / margin.relative_to(copy)).read_text(encoding="utf-8").splitlines()
+    line = lines.index(place) + 2
+    lines.insert(line - 1, typed)
     margin.write_text("\n".join(lines), encoding="utf-8")
     scene = ["-m", "sweep", "run", ROOT / "configs" / "quick.yaml", "--quiet", "--set", "integrator.method=dopri5"]
-    said = python(*scene, "--output", copy, folder=copy, code=1, NUMBA_CACHE_DIR="").stderr.splitlines()
+    said = python(*scene, "--output", tmp_path, folder=copy, code=1, NUMBA_CACHE_DIR="").stderr.splitlines()
     assert len(said) == 2
     assert said[0].startswith(f"{margin}:{line}: does not compile: ")
-    assert "gruop" in said[0]
+    assert named in said[0]

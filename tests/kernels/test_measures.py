@@ -50,8 +50,10 @@ def test_a_method_in_other_states_than_those_that_are_read_is_refused(monkeypatc
 
 
 def test_a_model_without_the_states_that_are_read_is_refused() -> None:
-    with pytest.raises(sweep.InputError, match="slid cannot be measured on the noslip model; choose from reversals"):
+    expected = "slid cannot be measured on the noslip model; choose from reversals"
+    with pytest.raises(sweep.InputError, match=expected) as raised:
         configured("noslip")
+    assert len(raised.value.faults) == 1  # another method would not help
 
 
 def test_a_value_that_goes_on_changing_keeps_a_run_to_its_end_unless_it_is_to_stop_early() -> None:

@@ -31,7 +31,7 @@ def mixed(kernel: Kernel) -> np.ndarray:
     if np.isfinite(kernel.stepper.real_stability):
         decay = np.linspace(300, 66, 45)  # shares of the stability limit, from below to beyond it
         cells = {
-            "step": np.where(FLYING, 1e-4, kernel.stepper.stable_step(decay)),
+            "step": np.where(FLYING, 2e-5, kernel.stepper.stable_step(decay)),
             "mu": np.where(FLYING, 20.0, np.linspace(20, 90, 45)),
             "b": np.where(FLYING, 3.0, cells["b"]), "x0": np.where(FLYING, 1.0, 0.01),
             "n0": np.where(FLYING, 3.0, np.tile([0.05, -0.03, 0.01, 0.03, 0.02], 9)),
