@@ -11,7 +11,7 @@ from sweep.jit import compiled
 from sweep.models.ladder import slip
 from sweep.models.slow import elementary, follow
 from sweep.models.slow import estimate as slow
-from sweep.models.slow.exchange import RESONANT, SECOND, TERMS, THIRD, Body, make_exchange
+from sweep.models.slow.exchange import RESONANT, SECOND, TERMS, THIRD, Body, coefficients, make_exchange
 from sweep.models.stiff.modes import RATTLE
 from sweep.models.theory import linear
 from sweep.models.theory.modes import modes_at
@@ -33,9 +33,10 @@ def test_the_matrix_has_the_eigenvalues_of_the_full_model() -> None:
     for b in (2.0, 5.0, 9.4):
         body = columns(b=b)
         p = slip.MODEL.constants.of(body)
-        reach, (exchange, _), table = 0.05, make_exchange(slip.MODEL), np.empty((5, TERMS), complex)
+        reach, (exchange, _), sums = 0.05, make_exchange(slip.MODEL), np.zeros((6, TERMS), complex)
         E = reach * modes_at(slip.MODEL, p, np.zeros(1)).of_unit_energy()[0]
-        exchange(Body(type(p)(*(each[0] for each in p)), reach), E, np.linalg.inv(E), table, np.empty(2))
+        exchange(Body(type(p)(*(each[0] for each in p)), reach), E, np.linalg.inv(E), sums)
+        table = coefficients(sums[None])[0][0]
         for x in (0.3, -0.8):
             C = (table[:, :4].T @ x ** np.arange(5)).reshape(2, 2)
             full = np.linalg.eigvals(linear.jacobian(slip.MODEL, p, np.array([x * reach])))[0]
@@ -265,8 +266,9 @@ def test_orders_of_the_corrections(b: float) -> None:
     w = f / (THIRD @ turning - at_rest[:, None])
 
     def left_over(size: float) -> np.ndarray:
-        table, kappa, a, reach = np.empty((5, TERMS), complex), np.empty(2), size * unit, 1.02 * np.sqrt(2) * size
-        exchange(Body(p, reach), reach * E, inverse / reach, table, kappa)
+        sums, a, reach = np.zeros((6, TERMS), complex), size * unit, 1.02 * np.sqrt(2) * size
+        exchange(Body(p, reach), reach * E, inverse / reach, sums)
+        (table,), (kappa,) = coefficients(sums[None])
         table /= reach ** np.repeat([0, 1, 2, 3], [4, 3, 12, 6])
         kappa /= reach**2
         terms = follow.Terms(*np.split(table[0], [4, 7, 13, 19]))

@@ -10,7 +10,7 @@ import numpy as np
 from sweep.jit import Cached, serial
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model, stack, take
-from sweep.models.slow.exchange import TERMS, Body, make_exchange
+from sweep.models.slow.exchange import TERMS, Body, coefficients, make_exchange
 from sweep.models.slow.follow import FOUND, compiled_follow
 from sweep.models.stiff.modes import RATTLE, rocks
 from sweep.models.stiff.slip import form_of
@@ -127,9 +127,10 @@ def _prepared(model: Model, states: Array, p: Any) -> _Cells:
     p, states, reach, rates = take(p, some), states[:, some], reach[some], modes.rates[body[some]]
     E = reach[:, None, None] * modes.of_unit_energy()[body[some]]
     rows = np.concatenate([stack((*p, -states[model.spin_state] / reach, reach)), states[list(RATTLE)]])
-    tables, starts = np.empty((len(some), 5, TERMS), complex), np.empty((len(some), 8))
+    sums, starts = np.empty((len(some), 6, TERMS), complex), np.empty((len(some), 8))
     followed = np.empty(len(some), bool)
-    compiled_exchange(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), tables, starts, followed)
+    compiled_exchange(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), sums, starts, followed)
+    tables, starts[:, 6:] = coefficients(sums)
     slower, faster = rates[:, :2].imag.T
     # Slip that decays more slowly than the faster mode turns acts on its own.
     apart = (3 * slower > (1 + _BELOW_THREE) * faster) & (rates[:, 4:].real < -faster[:, None]).all(axis=1)
@@ -154,7 +155,7 @@ def _modes_at_rest(model: Model, p: Any) -> tuple[Modes, Array]:
 
 @cache
 def compiled_exchange(model: Model) -> Cached:
-    """Compiled (rows, E, E⁻¹, tables, starts, followed) -> None: what `make_follow` needs of each cell.
+    """Compiled (rows, E, E⁻¹, sums, starts, followed) -> None: finds the terms of each cell, and where it starts.
 
     A row has the constants, the spin, the reach and the rattle; `followed` is as of `make_exchange`.
     """
@@ -162,14 +163,13 @@ def compiled_exchange(model: Model) -> Cached:
     load = compile_inline("load", "row", [f"return Of{tuple_of(f'row[{i}]' for i in range(n))}"], {"Of": record})
     exchange, begin = make_exchange(model)
 
-    def run(rows, E, inverse, tables, starts, followed):
-        bent = np.empty(2)
+    def run(rows, E, inverse, sums, starts, followed):
         for i in range(len(rows)):
             body = Body(load(rows[i]), rows[i, n + 1])
-            d, at_nodes = exchange(body, E[i], inverse[i], tables[i], bent)
+            d, at_nodes = exchange(body, E[i], inverse[i], sums[i])
             a1, a2, spin, at_start = begin(rows[i, n + 2 :], rows[i, n], body, E[i], inverse[i])
-            start = (a1.real, a1.imag, a2.real, a2.imag, spin, d, bent[0], bent[1])
-            for k in range(8):
+            start = (a1.real, a1.imag, a2.real, a2.imag, spin, d)
+            for k in range(6):
                 starts[i, k] = start[k]
             followed[i] = at_nodes and at_start
 

@@ -32,8 +32,8 @@ import numpy as np
 
 from sweep.jit import called, inline
 from sweep.models.model import Model
-from sweep.models.slow.elementary import quotient, square
-from sweep.models.theory.linear import FIT, NODES
+from sweep.models.slow.elementary import quotient, times
+from sweep.models.theory.linear import FIT, NODES, through_nodes
 
 # Products of a_1, a_2, a_1*, a_2*, by their exponents; each stands for its conjugate too.  `_MEAN` are the terms of H.
 _LINEAR = np.array([(1, 0, 0, 0), (0, 1, 0, 0)])
@@ -116,7 +116,6 @@ _NEAR = 0.02
 # they change Y by less than `_CLOSE`, and have failed if the last one changes it by more than `_FAR`.
 _ITERATIONS, _CLOSE, _FAR = 24, 1e-13, 1e-6
 
-_FIT_OF_THREE = np.linalg.inv(NODES[:_THREE, None] ** np.arange(_THREE))
 _SLOPE = (NODES[:, None] ** np.maximum(np.arange(5) - 1, 0) * np.arange(5)) @ FIT
 """Takes values at `NODES` to the derivative there of the polynomial through them."""
 
@@ -130,20 +129,26 @@ def _clear(matrix):
 
 
 @called
-def _combine(weights, rows, total):
-    """`total` = Σ weights_k rows_k, for as many columns as `total` has."""
+def _superpose(amplitudes, waves, total):
+    """`total` = the sum of `_waves` with complex amplitudes."""
     for i in range(len(total)):
         total[i] = 0.0
-    fours = len(weights) // 4 * 4
-    for k in range(0, fours, 4):  # one by one takes twice as long, because each sum waits for the one before it
+    for k in range(len(amplitudes)):
+        cos, sin, of_cos, of_sin = amplitudes[k].real, amplitudes[k].imag, waves[2 * k], waves[2 * k + 1]
+        for i in range(len(total)):
+            total[i] += cos * of_cos[i] + sin * of_sin[i]
+
+
+@called
+def _combine(weights, rows, total):
+    """`total` = Σ weights_k rows_k, for as many columns as `total` has; the number of weights is a multiple of four."""
+    for i in range(len(total)):
+        total[i] = 0.0
+    for k in range(0, len(weights), 4):  # one by one takes twice as long, because each sum waits for the one before it
         a, b, c, d = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
         of_a, of_b, of_c, of_d = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
         for i in range(len(total)):
             total[i] += (a * of_a[i] + b * of_b[i]) + (c * of_c[i] + d * of_d[i])
-    for k in range(fours, len(weights)):
-        a, of_a = weights[k], rows[k]
-        for i in range(len(total)):
-            total[i] += a * of_a[i]
 
 
 @called
@@ -154,6 +159,17 @@ def _product(A, B, result):
             total = 0.0j
             for j in range(A.shape[1]):
                 total += A[i, j] * B[j, k]
+            result[i, k] = total
+
+
+@called
+def _along_modes(inverse, parts, result):
+    """`result` = E⁻¹ z, where `parts` has real and imaginary parts of z in turn, for as many rows as `result` has."""
+    for i in range(result.shape[0]):
+        for k in range(result.shape[1]):
+            total = 0.0j
+            for j in range(inverse.shape[1]):
+                total += inverse[i, j] * complex(parts[j, 2 * k], parts[j, 2 * k + 1])
             result[i, k] = total
 
 
@@ -169,9 +185,13 @@ def _follow_modes(A, Y, C):
         if left < _CLOSE:
             break
         left = 0.0
-        _product(A[:2, 2:], Y, C)
         for j in range(2):
-            C[0, j], C[1, j] = C[0, j] + A[0, j], C[1, j] + A[1, j]
+            for i in range(2):
+                C[i, j] = 0.0j
+                for k in range(4):
+                    C[i, j] += A[i, k + 2] * Y[k, j]
+                C[i, j] += A[i, j]
+        for j in range(2):
             for i in range(4):
                 value = Y[i, 0] * C[0, j] + Y[i, 1] * C[1, j] - A[i + 2, j]
                 for k in range(4):
@@ -214,18 +234,6 @@ def _without_linear(share, linear, found):
             found[k, m] -= share * linear[k, i]
 
 
-@called
-def _bend(sums, large, bent):
-    """Find κ of T and of Q from their values at the usual amplitude and at a large one."""
-    squares = np.zeros((2, 2))
-    for m in range(LOWEST, TERMS):
-        squares[0, m // HIGHER] += square(sums[m])
-        squares[1, m // HIGHER] += square(large[m])
-    for k in range(2):
-        ratio = np.sqrt(squares[0, k] / squares[1, k])
-        bent[k] = (ratio - 1.0) / (_SIZES[_LARGE] ** 2 - ratio * _SIZES[_USUAL] ** 2)
-
-
 Body = namedtuple("Body", "p reach")
 """The constants of a body, and the fastest spin within reach, which is the unit of spins and amplitudes."""
 
@@ -257,34 +265,34 @@ def _make_equations(model: Model):
     def jacobian(n, body, E, inverse, A):
         """Find A in the modes at rest, from slopes of rattles along E so small that only linear terms are left."""
         # Twelve columns are used; sixteen are evaluated as fast, because eight at a time make a vector.
-        x, slopes, by_mode = np.zeros((7, 16)), np.empty((7, 16)), np.empty((6, 12))
-        parts, tiny = E.view(np.float64), _SIZES[_RIPPLE] ** 2
+        x, slopes, tiny = np.zeros((7, 16)), np.empty((7, 16)), _SIZES[_RIPPLE] ** 2
         for i in range(6):
-            for k in range(12):
-                x[i, k] = tiny * parts[i, k]
+            for k in range(6):
+                x[i, 2 * k], x[i, 2 * k + 1] = tiny * E[i, k].real, tiny * E[i, k].imag
         slopes_of(x, n, body, slopes)
         for i in range(6):
             for k in range(12):
-                by_mode[i, k] = slopes[i, k] / tiny
-        _product(inverse, by_mode.view(E.dtype), A)
+                slopes[i, k] /= tiny
+        _along_modes(inverse, slopes, A)
 
     @called
     def evaluate(level, n, body, shape, q, of_x, of_spin):
         """Evaluate the equations at an amplitude, and sum x' by `_OF_X` and ω3' by `_OF_SPIN`.
 
-        `shape` is E (1 + Y + w) by states, or without w, of shape (6, 2).
+        `shape` is E (1 + Y + w) by states, or without w, of shape (6, 2).  The sums are real and imaginary parts in
+        turn.
         """
-        points, parts, drag = _POINTS[level], shape.view(np.float64), slowed(n, body)
+        points, drag = _POINTS[level], slowed(n, body)
         x, slopes = np.empty((7, points)), np.empty((7, points))
         for i in range(6):
-            _combine(parts[i], _WAVES[level], x[i])
-        _combine(q.view(np.float64), _RIPPLES[level], x[6])
+            _superpose(shape[i], _WAVES[level], x[i])
+        _superpose(q, _RIPPLES[level], x[6])
         slopes_of(x, n, body, slopes)
         for i in range(len(of_x)):
-            _combine(slopes[i, : _POINTS_OF_X[level]], _OF_X[level], of_x[i].view(np.float64))
+            _combine(slopes[i, : _POINTS_OF_X[level]], _OF_X[level], of_x[i])
         for i in range(points):
             slopes[6, i] -= drag
-        _combine(slopes[6], _OF_SPIN[level], of_spin.view(np.float64))
+        _combine(slopes[6], _OF_SPIN[level], of_spin)
 
     return slowed, jacobian, evaluate
 
@@ -295,18 +303,23 @@ def _make_linear_terms(evaluate):
     @called
     def linear_terms(at, body, E, sums):
         n, _, C, Y, _, small, linear, q = at
-        basis, of_spin = np.zeros((6, 2), E.dtype), np.empty(6, E.dtype)
+        basis, of_spin = np.empty((6, 2), E.dtype), np.empty(12)
+        _clear(basis)
         for i in range(2):
             basis[i, i], q[i], q[2] = 1.0, 0.0, 0.0
             for k in range(4):
                 basis[k + 2, i] = Y[k, i]
         _product(E, basis, small)
         _product(basis, C, linear)
-        evaluate(_RIPPLE, n, body, small, q, np.empty((0, 1), E.dtype), of_spin)
+        evaluate(_RIPPLE, n, body, small, q, np.empty((0, 1)), of_spin)
         for k in range(4):
             sums[k] = C[k // 2, k % 2]
         for k in range(3):
-            sums[4 + k], q[k] = of_spin[k], -quotient(of_spin[3 + k], _rate_of(SECOND[k], C))
+            sums[4 + k], ripple = (
+                complex(of_spin[2 * k], of_spin[2 * k + 1]),
+                complex(of_spin[2 * k + 6], of_spin[2 * k + 7]),
+            )
+            q[k] = -quotient(ripple, _rate_of(SECOND[k], C))
 
     return linear_terms
 
@@ -317,9 +330,9 @@ def _make_higher_terms(evaluate):
     @called
     def find_shape(at, body, E, inverse, sums, shape):
         n, A, C, Y, slope, small, linear, q = at
-        of_x, found = np.empty((6, 10), E.dtype), np.empty((6, 10), E.dtype)
-        evaluate(_CUBIC, n, body, small, q, of_x, np.empty(0, E.dtype))
-        _product(inverse, of_x, found)
+        of_x, w, found = np.empty((6, 20)), np.empty((6, 10), E.dtype), np.empty((6, 10), E.dtype)
+        evaluate(_CUBIC, n, body, small, q, of_x, np.empty(0))
+        _along_modes(inverse, of_x, found)
         _without_linear(_SIZES[_CUBIC] ** -2, linear, found)
         for m in range(RESONANT):  # Y depends on the spin, which changes
             for i in range(2):
@@ -328,54 +341,70 @@ def _make_higher_terms(evaluate):
                     turn = sums[4 + j] if j == other else sums[6] if j == 0 else np.conj(sums[6])
                     for k in range(4):
                         found[k + 2, m] -= slope[k, i] * turn
-        _find_third(A, C, Y, found, of_x)
-        _product(E, of_x, found)
+        _find_third(A, C, Y, found, w)
+        _product(E, w, found)
         for k in range(6):
             for m in range(12):
                 shape[k, m] = small[k, m] if m < 2 else found[k, m - 2]
 
     @called
     def resonances(level, at, body, inverse, shape, sums):
-        of_x, found = np.empty((6, RESONANT), inverse.dtype), np.empty((2, RESONANT), inverse.dtype)
-        of_spin, per = sums[HIGHER:], _SIZES[level] ** -2
+        of_x, found = np.empty((6, 2 * RESONANT)), np.empty((2, RESONANT), inverse.dtype)
+        of_spin, per = np.empty(12), _SIZES[level] ** -2
         evaluate(level, at.n, body, shape, at.q, of_x, of_spin)
-        _product(inverse[:2], of_x, found)
+        _along_modes(inverse, of_x, found)
         _without_linear(per, at.linear, found)
         for i in range(2):
             for m in range(RESONANT):
                 sums[LOWEST + i * RESONANT + m] = found[i, m]
+        for k in range(6):
+            sums[HIGHER + k] = complex(of_spin[2 * k], of_spin[2 * k + 1])
         for k, h in ((0, 4), (1, 4), (1, 5), (2, 5), (3, 6), (4, 6)):  # `_OF_SPIN` leaves H in them
-            of_spin[k] -= per * sums[h]
+            sums[HIGHER + k] -= per * sums[h]
 
     return find_shape, resonances
 
 
-@called
-def _fit(sums, bent, table):
-    """Write the coefficients of the polynomials through what was found at the spins."""
-    _clear(table)
-    for m in range(TERMS):
-        fit = FIT if m < LOWEST else _FIT_OF_THREE
-        straight = 1.0 if m < LOWEST else 1.0 + bent[m // HIGHER] * _SIZES[_USUAL] ** 2
-        for k in range(len(fit)):
-            for j in range(len(fit)):
-                table[k, m] += straight * fit[k, j] * sums[j, m]
+def coefficients(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return polynomials in the spin through what was found at the spins, and κ of T and of Q.
+
+    The polynomials are of fourth degree for C and H, and of second degree for T and Q.
+
+    Parameters
+    ----------
+    sums : what `make_exchange` finds, shape (cells, 6, TERMS)
+
+    Returns
+    -------
+    Coefficients of the powers, shape (cells, 5, TERMS), and κ, shape (cells, 2).
+    """
+    at_nodes, large = np.moveaxis(sums[:, :5], 1, 0), sums[:, 5]
+    table, bent = np.zeros_like(at_nodes), np.empty((len(sums), 2))
+    table[:, :, :LOWEST] = through_nodes(at_nodes[:, :, :LOWEST])
+    for k, terms in enumerate((slice(LOWEST, HIGHER), slice(HIGHER, TERMS))):
+        usual, larger = ((np.abs(each[:, terms]) ** 2).sum(axis=1) for each in (sums[:, 0], large))
+        with np.errstate(all="ignore"):  # the modes could not be followed
+            ratio = np.sqrt(usual / larger)
+            bent[:, k] = (ratio - 1) / (_SIZES[_LARGE] ** 2 - ratio * _SIZES[_USUAL] ** 2)
+        straight = 1 + bent[:, k] * _SIZES[_USUAL] ** 2
+        table[:_THREE, :, terms] = straight[:, None] * through_nodes(at_nodes[:_THREE, :, terms])
+    return np.ascontiguousarray(np.moveaxis(table, 0, 1)), bent
 
 
 def make_exchange(model: Model):
-    """Compiled (body, E, E⁻¹, table, bent) -> (d, followed), which writes the coefficients of a body, and `begin`.
+    """Compiled (body, E, E⁻¹, sums) -> (d, followed), which finds the terms of a body, and `begin`.
 
-    E is in units of `reach`.  `table`, of shape (5, TERMS), gets the coefficients of the polynomials in the spin, of
-    fourth degree for C and H and of second degree for T and Q; and `bent` the two κ.  `followed` says whether the
-    modes could be followed to all spins.
+    E is in units of `reach`.  `sums`, of shape (6, TERMS), gets the terms at the five `NODES`, but T and Q only at
+    three; and as a last row those at rest with T and Q at a large amplitude.  `followed` says whether the modes could
+    be followed to all spins.
     """
     slowed, jacobian, evaluate = _make_equations(model)
     linear_terms, (find_shape, resonances) = _make_linear_terms(evaluate), _make_higher_terms(evaluate)
 
     @called
-    def exchange(body, E, inverse, table, bent):
+    def exchange(body, E, inverse, sums):
         A, C, Y = np.empty((5, 6, 6), E.dtype), np.empty((5, 2, 2), E.dtype), np.empty((5, 4, 2), E.dtype)
-        sums, slope, q = np.empty((5, TERMS), E.dtype), np.empty((4, 2), E.dtype), np.empty(3, E.dtype)
+        slope, q = np.empty((4, 2), E.dtype), np.empty(3, E.dtype)
         small, linear, shape = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
         followed = True
         for k in range(5):
@@ -385,14 +414,17 @@ def make_exchange(model: Model):
             at = At(NODES[k], A[k], C[k], Y[k], slope, small, linear, q)
             linear_terms(at, body, E, sums[k])
             if k < _THREE:
-                _combine(_SLOPE[k], Y.reshape((5, 8)), slope.reshape(8))
+                _clear(slope)
+                for m in range(5):
+                    for i in range(4):
+                        for j in range(2):
+                            slope[i, j] += times(_SLOPE[k, m], Y[m, i, j])
                 find_shape(at, body, E, inverse, sums[k], shape)
                 resonances(_USUAL, at, body, inverse, shape, sums[k])
             if k == 0:
-                large = sums[0].copy()
-                resonances(_LARGE, at, body, inverse, shape, large)
-                _bend(sums[0], large, bent)
-        _fit(sums, bent, table)
+                for m in range(LOWEST):
+                    sums[5, m] = sums[0, m]
+                resonances(_LARGE, at, body, inverse, shape, sums[5])
         return slowed(1.0, body), followed
 
     @called

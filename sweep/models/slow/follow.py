@@ -409,10 +409,10 @@ def _make_fill():
     @called
     def fill(g, t, lane, table, start, factors):
         size, spin, couple = factors[0], factors[3] * start[4], factors[1] * start[5]
-        parts, strong, both = table.view(np.float64), 0.0, table[0, 0] + np.conj(table[0, 3])
+        strong, both = 0.0, table[0, 0] + np.conj(table[0, 3])
         for j in range(5):
-            for k in range(2 * TERMS):
-                t[j, k, lane] = parts[j, k]
+            for k in range(TERMS):
+                t[j, 2 * k, lane], t[j, 2 * k + 1, lane] = table[j, k].real, table[j, k].imag
         for k in range(LOWEST, HIGHER):
             strong += 0.5 * square(table[0, k])
         for row in range(_ROWS):
@@ -454,9 +454,10 @@ def make_follow():
 
     @called
     def follow(tables, starts, cells, factors, found, sound):
-        g, t, s = np.zeros(_ROWS * _LANES), np.zeros((5, 2 * TERMS, _LANES)), np.empty(2 * TERMS * _LANES)
+        g, t, s = np.zeros(_ROWS * _LANES), np.zeros((5, 2 * TERMS, _LANES)), np.zeros(2 * TERMS * _LANES)
         whose, following, begun, most = np.full(_LANES, -1), 0, 0, _MOST_STEPS / min(factors[2], 1.0)
-        g[state : state + _LANES] = _FAILED
+        for lane in range(_LANES):
+            g[state + lane] = _FAILED
         while True:
             for lane in range(_LANES):
                 if g[state + lane] != _RUNNING:

@@ -145,8 +145,10 @@ FIT = np.linalg.inv(NODES[:, None] ** np.arange(len(NODES)))
 
 
 def through_nodes(values: Array) -> Array:
-    """Coefficients of the polynomials through values at `NODES`, lowest power first, along a first axis.
+    """Coefficients of the polynomials through values at the first `NODES`, lowest power first, along a first axis.
 
     This is not a matrix product, because the rounding of a cell by BLAS depends on the number of cells.
     """
-    return np.stack([sum(w * each for w, each in zip(row, values, strict=True)) for row in FIT])
+    n = len(values)
+    fit = FIT if n == len(NODES) else np.linalg.inv(NODES[:n, None] ** np.arange(n))
+    return np.stack([sum(w * each for w, each in zip(row, values, strict=True)) for row in fit])
