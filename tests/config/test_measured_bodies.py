@@ -223,7 +223,8 @@ def test_cells_of_an_earlier_run_are_reused_by_the_mass_that_is_given(tmp_path: 
 
 
 def test_a_trajectory_is_drawn_with_the_body_that_follows() -> None:
-    one, other = sweep.trajectory(loaded("52 g"), at={"mass": "52 g"}), sweep.trajectory(numbers(0, "52 g"))
+    one = sweep.trajectory({**loaded("52 g"), **REST}, at={"mass": "52 g"})
+    other = sweep.trajectory({**numbers(0, "52 g"), **REST})
     np.testing.assert_array_equal(reversal_times(one), reversal_times(other))
     assert len(reversal_times(one)) > 0
     for name, values in vars(body.moving(one, np.array([0.0, 1.0]))).items():

@@ -15,7 +15,7 @@ from sweep.kernels.status import IMPOSSIBLE
 
 RUN: dict[str, Any] = {
     "body": {"b": [0.5, 2.0, 3.0, 4.0, 5.0]}, "friction": {"mu": [30, 50, 70, 90, 110]}, "start": {"n0": 0.05},
-    "integrator": {"t_end": 1500}, "measure": ["reversals"],
+    "integrator": {"t_end": 1500},
 }  # fmt: skip
 
 
@@ -49,7 +49,7 @@ def test_a_size_of_a_solid_with_weights_can_be_changed() -> None:
     weights = [{"mass": "5 g", "at": at} for at in (["4 cm", "1 cm", "-2 mm"], ["-4 cm", "-1 cm", "-2 mm"])]
     body = {"solid": "half_ellipsoid", "length": "12 cm", "width": ["36 mm", "40 mm"], "height": "16 mm",
             "mass": "52 g", "weights": weights}  # fmt: skip
-    scene = {"units": "SI", "body": body, "friction": {"mu": 100}, "measure": ["reversals"],
+    scene = {"units": "SI", "body": body, "friction": {"mu": 100},
              "start": {"n0": [3, 5], "x0": "1 mm", "y0": "0.3 mm"}, "integrator": {"t_end": 20}}  # fmt: skip
     source = Source(sweep.run(scene))
     setup = Setup(source)
