@@ -5,6 +5,11 @@
      │           approach → the same twice?      │
      └───── repeat with a shorter step ──────────┘
 
+A run has one leg or two: it stops at the time `stop_early`, and goes on to `t_end` only if it can be predicted when it
+will be over. A run that fails makes an approach: it runs again from the start to a few steps ahead of the failure, and
+from there short steps show what it meets. A second run, with longer steps, goes to the end of the first; the difference
+of their spins gives the error. A repeat begins anew with a shorter step, and everything is decided again.
+
 When a stage of a cell has ended, `next_of` says where the cell goes next; the queue (`sweep.engine.executor`) applies
 it. Each cell is judged by its own results alone, so nothing depends on which cells are with it.
 """
@@ -39,8 +44,9 @@ from sweep.engine.lives import (
     Done,
     Lives,
     Next,
+    NextLeg,
     Repeat,
-    Run,
+    Resume,
     Second,
     note,
 )  # fmt: skip
@@ -73,9 +79,11 @@ def next_of(lives: Lives, which: Array) -> Going:
 
 
 def _after_run(lives: Lives, which: Array) -> Going:
-    """Is it over? A run goes on if it has ended too early (`sweep.engine.over`).
+    """Is it over? The slow equations predict what is left to come of the spin (`sweep.engine.over`).
 
-    A failed run is examined. Any other is judged at once: it has met nothing.
+    A run that has settled too early goes on to the end of its leg. A run at its time limit has settled if its spin will
+    reverse no more; at the end of the first leg it goes on if its spin will. A failed run makes an approach. Any other
+    is judged at once: it has met nothing.
     """
     run, settles = lives.take(which), lives.cells.rules.settles
     left = over.predicted(run, at_limit=settles)
@@ -83,8 +91,8 @@ def _after_run(lives: Lives, which: Array) -> Going:
     further &= settles & (lives.cells.rules.first_leg is not None) & (lives.notes["leg"][which] == FIRST)
     note(lives.notes, "left", which, left)
     lives.table["status"][which[final & settles]] = SETTLED
-    yield which[early], Run(settles=False)
-    yield which[further], Run(settles=True)
+    yield which[early], Resume()
+    yield which[further], NextLeg()
     yield which[run.failed], Approach()
     sound = which[~(early | further | run.failed)]
     yield from _judged(lives, sound, Met.nothing(len(sound)))
@@ -99,8 +107,8 @@ def _after_approach(lives: Lives, which: Array) -> Going:
 
 
 ROUNDS, FALSE_ROUNDS = 3, 8
-"""Largest number of repeats because of a failure, each with half the step of the one before; and the same if every run
-so far has failed spuriously, which makes its numbers worthless."""
+"""Largest number of repeats because of a failure, each with half the step of the one before; and the same for a run
+that meets another failure than the run before, which makes its numbers worthless."""
 
 SAME = 1e-6
 """Largest time difference at which two runs meet the same failure, in sqrt(c/g)."""
@@ -109,13 +117,14 @@ SAME = 1e-6
 def _judged(lives: Lives, which: Array, met: Met) -> Going:
     """Did it truly fail? The cells have ended, and `met` something, or nothing.
 
-    A failure is a statement about physics, so one run does not settle it: it is genuine if two runs, the second with
-    half the step of the first, meet the same one at the same time. The row then gets its status, its time and the spin
-    at that time. Otherwise the step is halved again, until a run ends soundly; that run replaces the first. A run that
-    still fails without meeting the same failure twice has `DIVERGED`, and so has every run whose energy balance is off
-    by more than `UNSOUND`.
+    A failure is a statement about physics, which needs two runs: it is genuine if a second one, with half the step,
+    meets the same failure at the same time. The row then gets its status, its time and the spin at that time, and the
+    cell is done. Otherwise the step is halved again. As soon as a run does not fail, it replaces the first, and the
+    failures are forgotten. After the last halving (`ROUNDS`) the same failure at another time suffices; a run that
+    meets another one than the run before has `DIVERGED`, and so has every run whose energy balance is off by more than
+    `UNSOUND`.
 
-    With a fixed step, the run with half the step only confirms.
+    With a fixed step, the run with half the step only confirms, and the first one is kept.
     """
     notes, rules, now = lives.notes[which], lives.cells.rules, lives.take(which)
     unsound, begun = failures.unsound(now), notes["halvings"] > 0

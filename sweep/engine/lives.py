@@ -43,11 +43,12 @@ tolerance; its error; and what was left to come of its
 spin when the run stopped."""
 
 
-class Run(NamedTuple):
-    """Run on from the present state."""
+class Resume(NamedTuple):
+    """Run on to the end of the same leg, without settling on the way."""
 
-    settles: bool
-    """Whether it may settle, and goes on to t_end; otherwise it goes to the end of the same leg."""
+
+class NextLeg(NamedTuple):
+    """Run on to t_end, and settle on the way if possible."""
 
 
 class Approach(NamedTuple):
@@ -74,7 +75,7 @@ class Done(NamedTuple):
     """Stay as it is."""
 
 
-Next = Run | Approach | Second | Repeat | Done
+Next = Resume | NextLeg | Approach | Second | Repeat | Done
 
 
 def note(notes: Array, name: str, which: Array, record: Met | Errors | Ending) -> None:
@@ -151,10 +152,10 @@ class Lives:
         if not len(which):
             return
         match to:
-            case Run(settles):
-                table = self.take(which).table
-                table["status"], table["settles"] = RUNNING, settles
-                if settles:
+            case Resume() | NextLeg():
+                table, further = self.take(which).table, isinstance(to, NextLeg)
+                table["status"], table["settles"] = RUNNING, further
+                if further:
                     table["goal"], self.notes["leg"][which] = table["steps"], LATER
                 self.rows[which] = table.rows
             case Approach():
