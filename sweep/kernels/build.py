@@ -58,7 +58,7 @@ _PIECES: dict[str, Callable[[Kernel], tuple[Cached, ...]]] = {
 }
 """The compiled functions of each piece."""
 
-_SECONDS = {BEGINNING: 4.0, PATH: 4.0, FAILING: 4.0, EXCHANGE: 8.0, FOLLOW: 5.0}
+_SECONDS = {BEGINNING: 4.0, PATH: 4.0, FAILING: 4.0, EXCHANGE: 4.0, FOLLOW: 5.0}
 """Time to compile a piece other than a kernel (`scripts/LOG.md`: `run_costs`)."""
 
 _DOES_NOT_COMPILE = 3
