@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from dataclasses import astuple, dataclass
+from decimal import Decimal
 from math import isfinite, nan, pi
 
 PAPER_UNITS, SI = "paper", "SI"
@@ -92,17 +93,22 @@ def factor(written: str, unit: Unit | None) -> float | None:
     plain = re.sub(r"[ *·]+", " ", unicodedata.normalize("NFKC", written).replace("^", "")).strip()
     if plain in (known := WRITTEN.get(unit or NUMBER, {})):
         return known[plain]
-    scale, powers = 1.0, [0, 0, 0, 0]
+    scale, powers = Decimal(1), [0, 0, 0, 0]
     for over, name, power in re.findall(_FACTOR, plain):
         size, one = _FACTORS.get(name, (nan, NUMBER))
         times = int(power or 1) * (-1 if over else 1)
         try:
-            scale *= size**times
-        except OverflowError:
+            scale *= Decimal(str(size)) ** times
+        except ArithmeticError:
             return None
         powers = [each + times * more for each, more in zip(powers, astuple(one), strict=True)]
     same = bool(re.fullmatch(f"({_FACTOR} ?)+", plain)) and Unit(*powers) == unit
-    return scale if same and isfinite(scale) else None
+    return float(scale) if same and isfinite(float(scale)) else None
+
+
+def converted(value: float, scale: float) -> float:
+    """Return the product of two numbers as that of their decimal digits: 36 times 0.001 is 0.036."""
+    return float(Decimal(str(value)) * Decimal(str(scale)))
 
 
 def parts(text: str) -> tuple[str, str, str]:
@@ -119,7 +125,7 @@ def quantity(text: str, unit: Unit | None, own: str = "") -> tuple[float, float]
     """
     value, error, written = parts(text)
     scale = None if not written else 1.0 if written == own else factor(written, unit)
-    return ((number(value) or 0.0) * scale, (number(error) or 0.0) * scale) if scale else None
+    return (converted(number(value) or 0.0, scale), converted(number(error) or 0.0, scale)) if scale else None
 
 
 def unit_in(text: str) -> str:

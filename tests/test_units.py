@@ -63,6 +63,9 @@ def test_a_quantity_is_a_number_with_its_error_and_its_unit() -> None:
     assert quantity("12,5cm", units.LENGTH) == quantity("12.5 cm", units.LENGTH)
     assert quantity("−0,5±0,25 cm", units.LENGTH) == pytest.approx((-0.005, 0.0025), rel=1e-15)
     assert quantity("2 kg·m²", units.INERTIA) == quantity("2 kg*m^2", units.INERTIA) == (2.0, 0.0)
+    for size in range(999):
+        assert quantity(f"{size} mm", units.LENGTH) == (float(f"{size}e-3"), 0.0)
+    assert quantity("7 cm**3*cm**-2", units.LENGTH) == (0.07, 0.0)
     wrong = ("1,250 cm", "1,5,2 cm", "12, cm", "12", "cm", "12 c", "12 g", "1.2.3cm", "12 cm cm", "nan cm", "12+-cm")
     assert [text for text in wrong if quantity(text, units.LENGTH)] == []
 

@@ -11,7 +11,7 @@ from sweep.config.document import Document, is_number
 from sweep.config.values import MAX_AXIS, in_si, instead
 from sweep.faults import Fault, InputError, brief, fault_of, refusal, suggestion
 from sweep.parameters import Parameter
-from sweep.units import ANGLE, Unit
+from sweep.units import ANGLE, Unit, converted
 
 Columns = dict[str, tuple[float, ...]]
 """Values of each parameter, by name."""
@@ -64,7 +64,7 @@ def _of_file(source: Document, name: str, known: Mapping[str, Parameter]) -> tup
         if table.units[i] and each in known:
             scale, of = table.scale(i, known[each].units), known[each].units
             units[each] = table.units[i] if isinstance(of, Unit) and of != ANGLE else ""
-            cells[each] = [cell * scale if is_number(cell) else cell for cell in cells[each]]
+            cells[each] = [converted(cell, scale) if is_number(cell) else cell for cell in cells[each]]
 
     def place(at: faults.Path, message: str) -> Fault:
         name, *row = at

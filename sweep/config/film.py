@@ -16,7 +16,7 @@ from sweep.config.tables import GAPS, SEPARATORS, Table, named
 from sweep.faults import InputError, brief, counted, either, fault_of, local_path, suggestion
 from sweep.grid import Array
 from sweep.kernels.samples import Seen
-from sweep.units import ANGLE, SPIN, TIME, Unit, factor
+from sweep.units import ANGLE, SPIN, TIME, Unit, converted, factor
 
 MOST_ROWS = 20_000
 """Most rows of a film; a longer film is thinned evenly, since more rows add time and hardly any information."""
@@ -217,7 +217,7 @@ def _column(table: Table, place: int, unit: Unit | None, gaps: dict[int, str]) -
         words = f"'{brief(texts[strange[0]], 40)}' is not a number ({len(odd)} of {len(cells)} cells)"
         words += "; write numbers only, put the unit in the header, and leave missing cells empty"
         raise InputError([table.fault(words, place, strange[0])])
-    return np.array([np.nan if isinstance(cell, str) else cell * scale for cell in cells])
+    return np.array([np.nan if isinstance(cell, str) else converted(cell, scale) for cell in cells])
 
 
 def _why(missing: int, gaps: Mapping[int, str], whole: int, every: int) -> str:

@@ -1,4 +1,4 @@
-"""Tries, where a fit cannot be trusted, which one change of film, body or law would make it better.
+"""Tries which one change of film, body or law would make a fit better: all if it is doubtful, else sign and law.
 
 Each change is a fit of its own, from fewer points and without intervals.
 """
@@ -19,7 +19,7 @@ from sweep.grid import BODY
 from sweep.models.general.laws import LAWS, Law
 from sweep.studies import ranges, search, verdict
 from sweep.studies.misfit import Minimum, Note, Problem
-from sweep.units import ANGLE, SPIN, TIME, named, pretty
+from sweep.units import ANGLE, SPIN, named, pretty
 
 _POINTS, _KEPT = 64, 2
 """Numbers of points all over the ranges and of best points to continue from."""
@@ -37,6 +37,13 @@ _LATE, _EARLY = (1 / 8, 1 / 4), (1 / 2, 3 / 4)
 _LESS, _ROOM = 0.8, 1.3
 """Share of the misfit below which a change is worth naming, and factor by which outliers may raise one."""
 
+SURE = 14.0
+"""Fall of Akaike's criterion above which a change is so much more likely, 1000 to 1, that a fit cannot be trusted."""
+
+
+_ALWAYS = ("the sign", "the law")
+"""Changes that are tried for every fit: start and sizes can make up for a wrong law until residuals look like noise."""
+
 
 @dataclass(frozen=True)
 class _Change:
@@ -53,20 +60,26 @@ class _Change:
 
 def advised(
     config: Config, posed: Problem, free: Sequence[str], problem: Problem, best: Minimum, note: Note, *, compared: bool
-) -> str:
-    """Try changes one at a time, and say which of them reduces the misfit most.
+) -> tuple[str, float]:
+    """Try changes one at a time; say which of them is most likely, and by how much it lowers Akaike's criterion.
 
     `posed` is the problem that led to the `best` minimum of `problem`; `compared` says whether laws are compared.
     """
     before, kinds, film = _size(problem, best), list[str](), posed.film
+    judged = verdict.judged(problem, best)
 
     def silent(_: str) -> None: ...
 
-    tried: list[tuple[bool, float, int, float, str]] = []
+    def criterion(problem: Problem, size: float) -> float:
+        return 2 * (len(film.time) * float(np.log(max(size, 1e-300))) + len(problem.unknown))
+
+    tried: list[tuple[bool, float, float, str]] = []
     for changes in (_changes(config, posed, free, compared=compared), _cuts(posed)):
         for change in changes:
+            if not judged.doubtful and change.kind not in _ALWAYS:
+                continue
             kinds += [change.kind] * (change.kind not in kinds)
-            least = min([before, *(each[3] for each in tried)]) * change.scale / np.median(film.errors)
+            least = min([before, *(each[2] for each in tried)]) * change.scale / np.median(film.errors)
             most = (_ROOM * least) ** 2 * change.problem.rows
             minima = search.search(change.problem, _POINTS, _KEPT, 0, silent, most)
             if minima[0].misfit > most:
@@ -75,15 +88,16 @@ def advised(
             fits, size = verdict.judged(calm, minima[0]).fits, _size(calm, minima[0]) / change.scale
             note(f"{change.words}: misfit {size:.3g}, where it was {before:.3g}")
             words = change.words + _value(change.shows, calm, minima[0])
-            tried.append((not fits, float(f"{size:.2g}"), len(tried), size, words))  # of equals the first
-        if not all(each[0] for each in tried):
+            tried.append((not fits, criterion(calm, size), size, words))
+        if judged.fits or not all(each[0] for each in tried):  # a cut leaves too few rows to compare their noise
             break
-    off, size, *_, words = min(tried, default=(True, before, 0, before, ""))
+    usual = criterion(problem, before)
+    off, least, size, words = min(tried, default=(True, usual, before, ""))
     unit = pretty(named(ANGLE if film.what == "heading" else SPIN, config.units))
     fall = f"which reduces the misfit from {before:.2g} to {size:.2g} {unit}"
     if size > _LESS * before and off:
-        return f"No single change makes it much better; tried were {either(kinds).replace(' or ', ' and ')}."
-    return f"Change one thing: {words}, {fall}{'; the curve then fits' * (not off)}."
+        return f"No single change makes it much better; tried were {either(kinds).replace(' or ', ' and ')}.", 0.0
+    return f"Change one thing: {words}, {fall}{'; the curve then fits' * (not off)}.", usual - least
 
 
 def _size(problem: Problem, best: Minimum) -> float:
@@ -96,10 +110,7 @@ def _value(name: str, problem: Problem, best: Minimum) -> str:
     if not name:
         return ""
     value = problem.values(best.place)[[*problem.free].index(name)]
-    table = problem.config.table
-    unit = table[name].units if name in table else TIME if name == "film_delay" else SPIN
-    written = unit if isinstance(unit, str) else named(unit, problem.config.units)
-    return f" = {value:.3g} {pretty(written)}".rstrip()
+    return f" = {value:.3g}{verdict.unit_after(problem.config, name)}"
 
 
 def _changes(config: Config, posed: Problem, free: Sequence[str], *, compared: bool) -> Iterator[_Change]:

@@ -18,7 +18,7 @@ from sweep.results import dataset
 from sweep.results.kind import FIT
 from sweep.results.provenance import provenance
 from sweep.studies import search, verdict
-from sweep.studies.changes import advised
+from sweep.studies.changes import SURE, advised
 from sweep.studies.intervals import LEVELS, blind, covariance, intervals, variance
 from sweep.studies.misfit import UNKNOWNS, Minimum, Note, Problem
 from sweep.units import ANGLE, SPIN, TIME
@@ -54,7 +54,9 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared
             at = problem.mirrored
             limits[..., at] = 1 - limits[:, ::-1][..., at]
         judged = verdict.judged(problem, best)
-        advice = "" if judged.fits else advised(config, posed, free, problem, best, note, compared=compared)
+        advice, gain = advised(config, posed, free, problem, best, note, compared=compared)
+        if judged.fits and gain > SURE:
+            judged = judged._replace(reasons=["the film is far more likely with one change"])
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
     return _labelled(problem, [best, *minima[1:]], limits, words, time.perf_counter() - began, judged, advice)
 

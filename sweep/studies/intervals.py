@@ -129,7 +129,7 @@ def _scanned(problem: Problem, best: Minimum) -> list[Minimum]:
             searches.append((i, np.where(np.arange(len(problem.free)) == i, end, best.place)))
     found, unit = list[Minimum](), variance(problem, best)
     for enough in _ACCURACIES:
-        found = _minimised(problem, [partial(minimise, place=at, fixed=i, enough=enough) for i, at in searches])
+        found = _minimised(problem, [partial(minimise, place=at, fixed=[i], enough=enough) for i, at in searches])
         low = [each.misfit < best.misfit + _HIGH * unit for each in found]
         found = [*compress(found, low)]
         searches = [(i, each.place) for (i, _), each in zip(compress(searches, low), found, strict=True)]
@@ -156,7 +156,7 @@ def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, fl
             places = [place for place, rise in known + side.valley if rise < 10 * allowed]
             starts = _starts(places, best.place + along * (end - best.place[i]), i, end)
             start = min(starts, key=lambda each: float(np.sum(ask(each[None]) ** 2)))
-            found = minimise(ask, start, i, _ENOUGH / problem.rows)
+            found = minimise(ask, start, [i], _ENOUGH / problem.rows)
             above = (found.misfit - best.misfit) / unit
             side.valley.append((found.place, above))
             if above < -_LOWER * allowed:

@@ -182,18 +182,19 @@ class Problem:
         return [self._steps[key] for key in keys]
 
 
-def minimise(ask: Ask, place: Array, fixed: int | None = None, enough: float = ENOUGH) -> Minimum:
-    """Find the minimum near a place, over all parameters except the `fixed` one.
+def minimise(ask: Ask, place: Array, fixed: Sequence[int] = (), enough: float = ENOUGH) -> Minimum:
+    """Find the minimum near a place, over all parameters except the `fixed` ones, whose columns of the Jacobian are 0.
 
     The search ends when a step changes the misfit by less than the share `enough`.  It is Levenberg and Marquardt's,
     and its steps bend as valleys do (geodesic acceleration: Transtrum and Sethna 2012, arXiv:1201.5885).
     """
     here, damping, size = place.copy(), _DAMPING, np.zeros(len(place))
-    away, jacobian = _look(ask, here)
+    varied = np.delete(np.arange(len(place)), list(fixed))
+    away, jacobian = _look(ask, here, varied)
     for _ in range(_MOST_STEPS):
         misfit, slope = away @ away, jacobian.T @ away
         closed = ((here <= 0) & (slope > 0)) | ((here >= 1) & (slope < 0))
-        moved = np.flatnonzero(~closed & (np.arange(len(place)) != fixed))
+        moved = varied[~closed[varied]]
         columns, size = jacobian[:, moved], np.maximum(size, np.linalg.norm(jacobian, axis=0))
         factors = damping * np.array(_FACTORS)
         scaled = factors[:, None, None] * np.diag(np.maximum(size[moved], _FLAT) ** 2)
@@ -210,7 +211,7 @@ def minimise(ask: Ask, place: Array, fixed: int | None = None, enough: float = E
         best = int(np.argmin(misfits))
         if misfits[best] < misfit:
             here, damping = tried[best], max(factors[best], _LEAST_DAMPING)
-            away, jacobian = _look(ask, here)
+            away, jacobian = _look(ask, here, varied)
         else:
             damping = factors[-1] * _FACTORS[-1]
         if misfits[best] < misfit < misfits[best] * (1 + enough) or damping > _MOST_DAMPING:
@@ -218,12 +219,14 @@ def minimise(ask: Ask, place: Array, fixed: int | None = None, enough: float = E
     return Minimum(here, float(away @ away), jacobian, away)
 
 
-def _look(ask: Ask, place: Array) -> tuple[Array, Array]:
+def _look(ask: Ask, place: Array, varied: Array) -> tuple[Array, Array]:
     """Return the residuals at a place and their Jacobian."""
-    steps = _NEAR * np.eye(len(place))
+    steps = _NEAR * np.eye(len(place))[varied]
     found = ask(np.concatenate([place[None], place + steps, place - steps]))
-    ahead, behind = found[1 : len(place) + 1], found[len(place) + 1 :]
-    return found[0], (ahead - behind).T / (2 * _NEAR)
+    ahead, behind = np.split(found[1:], 2)
+    jacobian = np.zeros((found.shape[1], len(place)))
+    jacobian[:, varied] = (ahead - behind).T / (2 * _NEAR)
+    return found[0], jacobian
 
 
 def _moved(place: Array, moved: Array, steps: Array) -> Array:

@@ -2,7 +2,8 @@
 
 The misfit has many minima: a trajectory with one more reversal is a different minimum. The search therefore starts from
 points all over the ranges (Sobol), and fits the beginning of the film first, then half as much again, and so on. If the
-curve that it finds does not fit, the search is repeated from more points.
+curve that it finds does not fit, the search is repeated from more points, and measured parameters, which may have made
+up for a wrong start, vary only over the whole film.
 """
 
 from __future__ import annotations
@@ -153,13 +154,16 @@ def turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
 
 def search(problem: Problem, points: int, kept: int, seed: int, note: Note, most: float = np.inf) -> list[Minimum]:
     """Return minima over the whole film, lowest first; over its beginning if their misfit exceeds `most` there."""
-    sobol = qmc.Sobol(len(problem.free), rng=seed).random(points)
-    rows = len(problem.film.time)
+    sobol, rows = qmc.Sobol(len(problem.free), rng=seed).random(points), len(problem.film.time)
+    known = problem.measured if seed else []
+    centre = np.array([each.place(each.prior[0]) if each.prior else 0.5 for each in problem.free.values()])
+    sobol[:, known] = centre[known]
     horizons = [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
-    places = [np.full(len(problem.free), 0.5), *sobol[np.argsort(cost)[:kept]]]
+    places = [centre, *sobol[np.argsort(cost)[:kept]]]
     for number, instants in enumerate(horizons, start=1):
-        minima = _minimised(problem, places, instants, ENOUGH if instants == rows else _ROUGHLY)
+        accuracy, held = (ENOUGH, ()) if instants == rows else (_ROUGHLY, known)
+        minima = _minimised(problem, places, instants, accuracy, held)
         note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
         if minima[0].misfit > most:
@@ -168,11 +172,13 @@ def search(problem: Problem, points: int, kept: int, seed: int, note: Note, most
 
 
 def _minimised(
-    problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = ENOUGH
-) -> list[Minimum]:
+    problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = ENOUGH,
+    fixed: Sequence[int] = (),
+) -> list[Minimum]:  # fmt: skip
     """Return the minima near these places, lowest first, over the film or its first instants."""
     answers = partial(problem.answers, instants=instants)
-    return _different(run_concurrently([partial(minimise, place=place, enough=enough) for place in places], answers))
+    searches = [partial(minimise, place=place, fixed=fixed, enough=enough) for place in places]
+    return _different(run_concurrently(searches, answers))
 
 
 def settled(problem: Problem, minima: list[Minimum], note: Note) -> tuple[Problem, list[Minimum]]:

@@ -2,7 +2,9 @@
 
 The residuals of a correct curve are independent of each other. Their noise, estimated from third differences that
 remove slow variations, is then as large as they are, and neither their autocorrelation (Ljung and Box 1978, doi
-10.1093/biomet/65.2.297) nor the lengths of their runs of one sign (Wald and Wolfowitz 1940) are unusual.
+10.1093/biomet/65.2.297) nor the lengths of their runs of one sign (Wald and Wolfowitz 1940) are unusual.  In short
+films chi square gives that autocorrelation ten times too small a probability, which noise fitted by the same curve
+corrects.
 """
 
 from __future__ import annotations
@@ -23,6 +25,13 @@ from sweep.units import ANGLE, SPIN, TIME, named, pretty
 
 # The probability that one of the tests rejects a correct curve, and the lags of the autocorrelation.
 _CHANCE, _LAGS = 1e-3, 20
+
+_DOUBT = 0.05
+"""The probability below which the residuals of a correct curve, or its distances from what was measured, are odd enough
+to try changes."""
+
+# Numbers of rows of a short film, and of samples of noise.
+_SHORT, _SAMPLES = 2000, 4000
 
 # Outliers are this many times the noise off the curve and off their neighbours; a fit with more than this share is
 # rejected.
@@ -49,6 +58,12 @@ class Verdict(NamedTuple):
     """Root mean square of the residuals, in units of the film's errors."""
     noise: float
     """The part of it that is noise."""
+    odd: float
+    """The probability that a correct curve is as far off film and measured values, or farther."""
+
+    @property
+    def doubtful(self) -> bool:
+        return not self.fits or self.odd < _DOUBT
 
     @property
     def fits(self) -> bool:
@@ -65,17 +80,22 @@ def judged(problem: Problem, best: Minimum) -> Verdict:
     kept = problem.kept
     away = best.away[: len(kept)][kept]
     size, noise = float(np.sqrt(np.mean(away**2))), own_noise(away)
-    reasons = [] if not np.isfinite(size) else _structure(away, size, noise)
+    pulls = best.away[len(kept) :] / problem.scale
+    odd, reasons = _oddity(problem, best, away) if size > 0 and np.isfinite(size) else 1.0, list[str]()
+    if odd < _CHANCE:
+        by = f"{size / noise:.2g} times its noise" if size > 1.3 * noise > 0 else "more than noise"
+        reasons.append(f"the curve misses the film by {by}, and stays on one side of it for many rows")
+    if size > 0 and stats.kurtosis(away) > _TAILS * sqrt(24 / len(away)):
+        reasons.append("some rows are farther off the curve than noise brings them")
     if problem.film.error is not None and stats.chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
         reasons.append(f"the curve misses the film by {size:.3g} times its errors")
     if (left_out := int((~kept).sum())) > _SHARE * len(kept):
         reasons.append(f"{left_out} of {len(kept)} rows are outliers")
     if ends := pressed(problem, best):
         reasons.append(f"{_all(ends)} would leave the range that was searched")
-    far = np.abs(best.away[len(kept) :] / problem.scale)
-    if off := [name for i, name in enumerate(np.array([*problem.free])[problem.measured]) if far[i] > _FAR]:
+    if off := np.array([*problem.free])[problem.measured][np.abs(pulls) > _FAR].tolist():
         reasons.append(f"{_all(off)} would be more than {_FAR:g} errors from the measured value")
-    return Verdict(reasons, size, noise)
+    return Verdict(reasons, size, noise, min(odd, stats.chi2.sf(pulls @ pulls, len(pulls)) if len(pulls) else 1.0))
 
 
 def _all(names: Iterable[str]) -> str:
@@ -87,24 +107,31 @@ def own_noise(values: Array) -> float:
     return float(np.sqrt(np.mean(np.diff(values, 3) ** 2) / 20)) if len(values) > 3 else 0.0
 
 
-def _structure(away: Array, size: float, noise: float) -> list[str]:
-    """Say which part of the residuals is not noise; return "" if all of it is."""
-    if not size:
-        return []
+def _oddity(problem: Problem, best: Minimum, away: Array) -> float:
+    """Return the probability that noise is as correlated as the residuals, or has as long runs of one sign."""
     n, lags = len(away), min(_LAGS, len(away) // 5)
-    shares = np.array([away[:-lag] @ away[lag:] for lag in range(1, lags + 1)]) / (away @ away)
-    correlated = stats.chi2.sf(n * (n + 2) * np.sum(shares**2 / (n - np.arange(1, lags + 1))), lags)
+    found = _correlation(away[None], lags)[0]
+    correlated = float(stats.chi2.sf(found, lags))
+    if correlated < _DOUBT and n < _SHORT:
+        kept = np.concatenate([problem.kept, np.ones(len(problem.measured), bool)])
+        columns = best.jacobian[kept]
+        if problem.film.what == "heading":  # a film does not show where a heading is counted from
+            columns = np.column_stack([columns, np.arange(len(columns)) < n])
+        basis = np.linalg.qr(columns)[0]
+        samples = np.random.default_rng(0).normal(size=(_SAMPLES, len(columns)))
+        correlated = float(np.mean(_correlation((samples - samples @ basis @ basis.T)[:, :n], lags) >= found))
     above = away > 0
     ups, downs, runs = above.sum(), (~above).sum(), 1 + np.count_nonzero(above[1:] != above[:-1])
     expected = 1 + 2 * ups * downs / n
     in_runs = stats.norm.cdf((runs - expected) / max(sqrt(max((expected - 1) * (expected - 2), 0) / (n - 1)), 1e-9))
-    words = []
-    if min(correlated, in_runs) < _CHANCE:
-        by = f"{size / noise:.2g} times its noise" if size > 1.3 * noise > 0 else "more than noise"
-        words.append(f"the curve misses the film by {by}, and stays on one side of it for many rows")
-    if stats.kurtosis(away) > _TAILS * sqrt(24 / n):
-        words.append("some rows are farther off the curve than noise brings them")
-    return words
+    return min(correlated, float(in_runs))
+
+
+def _correlation(away: Array, lags: int) -> Array:
+    """Return Ljung and Box's measure of the autocorrelation of residuals of shape (samples, rows)."""
+    n, squares = away.shape[1], np.einsum("ij,ij->i", away, away)
+    shares = [np.einsum("ij,ij->i", away[:, :-lag], away[:, lag:]) / squares for lag in range(1, lags + 1)]
+    return np.asarray(n * (n + 2) * sum(share**2 / (n - lag) for lag, share in enumerate(shares, start=1)))
 
 
 def outliers(problem: Problem, best: Minimum) -> Array:
@@ -179,7 +206,7 @@ def _known(config: Config, names: Sequence[str], values: Array, limits: Array, e
     for name, value, (low, high), at in zip(names, values, limits.T, edge, strict=True):
         if not at:
             words = config.described(name)["long_name"] if name in config.table else name
-            phrases.append(f"{words} is {_digits(value, high - low)}{_unit(config, name)} "
+            phrases.append(f"{words} is {_digits(value, high - low)}{unit_after(config, name)} "
                         f"({_digits(low, high - low)} to {_digits(high, high - low)})")  # fmt: skip
     return f"At 95 % confidence, {', '.join(phrases)}." if phrases else "It determines none of the free parameters."
 
@@ -190,7 +217,7 @@ def _digits(value: float, width: float) -> str:
     return f"{value:.{min(digits, 8)}g}"
 
 
-def _unit(config: Config, name: str) -> str:
+def unit_after(config: Config, name: str) -> str:
     """Return the unit of a parameter, as figures print it, after a space."""
     of_film = {"film_delay": named(TIME, config.units), "film_bias": named(SPIN, config.units)}
     found = config.described(name).get("units", "") if name in config.table else of_film[name]

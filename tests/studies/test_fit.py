@@ -35,6 +35,7 @@ from sweep.studies.filmed import shown
 from sweep.studies.intervals import intervals
 from sweep.studies.misfit import UNKNOWNS, Minimum, Problem, minimise
 from sweep.studies.ranges import Range
+from sweep.studies.verdict import judged
 
 SCENE = "name: scene\nfriction: {mu: [30, 100]}\nstart: {n0: [0.03, 0.07], x0: 0.01, y0: 0.01}\n"
 STONE = """\
@@ -230,6 +231,21 @@ def test_an_interval_holds_other_minima_that_fit_as_well() -> None:
     for low, high in limits:
         assert low[0] < 0.3 < 0.69 < high[0]
         assert low[1] < 0.15 < 0.34 < high[1]
+
+
+def test_a_right_curve_of_many_parameters_in_a_short_film_is_hardly_ever_refused() -> None:
+    """One in 500 by construction; chi square for Ljung and Box's sum would refuse 2 %."""
+    times, random = np.linspace(-1, 1, 83), np.random.default_rng(5)
+    columns = np.polynomial.legendre.legvander(times, 8)
+    basis, free = np.linalg.qr(columns)[0], {f"p{i}": Range(0.0, 1.0, 1e9) for i in range(9)}
+    problem = Problem(cast("sweep.Config", None), Film(times, times), free, np.ones(83, bool))
+
+    def fits(values: np.ndarray) -> bool:
+        away = values - basis @ basis.T @ values
+        return judged(problem, Minimum(np.full(9, 0.5), float(away @ away), columns, away)).fits
+
+    assert sum(fits(random.normal(size=83)) for _ in range(400)) >= 397
+    assert not any(fits(random.normal(size=83) + 1.5 * np.sin(30 * times)) for _ in range(10))
 
 
 @pytest.mark.release
@@ -430,6 +446,19 @@ def test_what_a_film_needs_is_named(write: Write, kind: str) -> None:
     assert change in found.attrs["verdict"].splitlines()[1]
 
 
+@pytest.mark.parametrize(("delta", "believed"), [(0.036, True), (0.039, False)])
+@pytest.mark.usefixtures("by_formula")
+def test_a_fit_that_strains_three_sizes_is_left_for_one_change(write: Write, delta: float, believed: bool) -> None:
+    """An angle that is off by several errors, which three measured numbers share, each fewer than 3.5."""
+    film = Film(TIMES[:60], noisy(formula(TIMES[:60], **TRUTH, delta=delta)))
+    known = {"delta": {"normal": [0.03, 1e-3]}, "b": {"normal": [3.0, 0.12]}, "y0": {"normal": [0.01, 1.6e-3]}}
+    found = sweep.fit(write(SCENE), film, ["n0"], mu=TRUTH["mu"], **known)
+    assert found.attrs["fits"] == believed
+    if not believed:
+        assert found.attrs["fits_because"] == "the film is far more likely with one change"
+        assert "\nChange one thing: correct " in found.attrs["verdict"]
+
+
 @pytest.mark.usefixtures("by_formula")
 def test_a_film_that_no_change_mends_has_its_trials_listed(write: Write) -> None:
     film = Film(TIMES, noisy(0.05 * np.sin(TIMES**1.5 / 9)))
@@ -473,6 +502,18 @@ def test_the_floor_of_a_bent_valley_is_followed_in_few_steps() -> None:
     found = minimise(ask, np.array([0.2, 0.75]))
     np.testing.assert_allclose(found.place, 0.75, atol=1e-5)
     assert sum(asked) < 400
+
+
+def test_a_parameter_that_is_held_stays_and_costs_no_trajectory() -> None:
+    asked = list[int]()
+
+    def ask(places: np.ndarray) -> np.ndarray:
+        asked.append(len(places))
+        return places - np.array([0.3, 0.7])
+
+    found = minimise(ask, np.array([0.4, 0.4]), fixed=[0])
+    np.testing.assert_allclose(found.place, [0.4, 0.7], atol=1e-6)
+    assert asked[0] == 3
 
 
 def test_a_minimum_at_a_bound_is_found() -> None:

@@ -4,9 +4,10 @@ Bodies and films are made by another program (`support.films`).  A campaign trie
 
     SWEEP_FILMS=0:20 SWEEP_SPOILT=0:10 python -m pytest -n0 -s -m campaign tests/studies/test_measured_films.py
 
-With SWEEP_FILMS_SEED=64, 12 of the first 13 intervals hold the friction, and the next film is refused wrongly.  Of ten
-spoilt films the change is named for three only: six are believed, because free sizes and starts make up for what is
-wrong.  So the second test passes for the film that it tries by default, and not yet for all.
+(with --timeout=0; a film takes two minutes of processor time).  Of the first 13 films of SWEEP_FILMS_SEED=64, 12
+intervals held the friction; the 14th, refused then, is believed now.  A film that begins late or a size off by a fifth
+often cannot be told from a right one: start and sizes make up for it within the noise.  So the second test passes for
+the film that it tries by default, and not for all.
 """
 
 import os
@@ -66,7 +67,7 @@ def spoilt(one: films.Filmed, kind: str, random: np.random.Generator) -> tuple[d
         other = "viscous" if one.friction["law"] == "coulomb" else "coulomb"
         return one.scene(law=other), film, f"law: {one.friction['law']}"
     if kind == "late":
-        kept = film.time > film.time[-1] * random.uniform(0.04, 0.09)
+        kept = film.time > random.uniform(0.3, 0.7) * 2 * np.pi / abs(one.start["n0"])  # in the middle of a turn
         return scene, replace(film, time=film.time[kept] - film.time[kept][0], value=film.value[kept]), "film_delay"
     if kind == "rate":
         rate = random.choice([0.5, 2.0])
