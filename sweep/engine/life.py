@@ -1,9 +1,10 @@
 """Takes a cell from its start to a result that can be trusted.
 
-    run → over? → failed? → second run → within its tolerance? → done
-     ↑              ↓ yes                        ↓ no
-     │           approach → the same twice?      │
-     └───── repeat with a shorter step ──────────┘
+    run → over? → failed? ── no → second run → within its tolerance? ── yes → done
+     ↑              ↓ yes                        ↓ no                          ↑
+     │           approach → the same twice? ─────│──────────────────────── yes ┘
+     │                          ↓ no             ↓
+     └─────────────── repeat with a shorter step ┘
 
 A run has one leg or two: it stops at the time `stop_early`, and goes on to `t_end` only if it can be predicted when it
 will be over. A run that fails makes an approach: it runs again from the start to a few steps ahead of the failure, and
@@ -81,9 +82,9 @@ def next_of(lives: Lives, which: Array) -> Going:
 def _after_run(lives: Lives, which: Array) -> Going:
     """Is it over? The slow equations predict what is left to come of the spin (`sweep.engine.over`).
 
-    A run that has settled too early goes on to the end of its leg. A run at its time limit has settled if its spin will
-    reverse no more; at the end of the first leg it goes on if its spin will. A failed run makes an approach. Any other
-    is judged at once: it has met nothing.
+    A run that has settled too early goes on to the end of its leg. At a time limit, a run has settled if its spin will
+    reverse no more; if it will, and this was the first leg, the second one follows; if neither can be predicted, the
+    run ends there. A failed run makes an approach. Any other is judged at once: it has met nothing.
     """
     run, settles = lives.take(which), lives.cells.rules.settles
     left = over.predicted(run, at_limit=settles)
@@ -117,14 +118,16 @@ SAME = 1e-6
 def _judged(lives: Lives, which: Array, met: Met) -> Going:
     """Did it truly fail? The cells have ended, and `met` something, or nothing.
 
-    A failure is a statement about physics, which needs two runs: it is genuine if a second one, with half the step,
-    meets the same failure at the same time. The row then gets its status, its time and the spin at that time, and the
-    cell is done. Otherwise the step is halved again. As soon as a run does not fail, it replaces the first, and the
-    failures are forgotten. After the last halving (`ROUNDS`) the same failure at another time suffices; a run that
-    meets another one than the run before has `DIVERGED`, and so has every run whose energy balance is off by more than
-    `UNSOUND`.
+    A failure is a statement about physics, which needs two runs: it is genuine if a repeat with half the step meets the
+    same failure at the same time. The row then gets its status, its time and the spin at that time, and the cell is
+    done. Otherwise the step is halved again. A run whose energy balance is off by more than `UNSOUND` is repeated as if
+    it had failed. As soon as a run is sound, it replaces the first, and the failures are forgotten. After the last
+    halving (`ROUNDS`) the same failure at another time suffices; a run that meets another one than the run before, or
+    has no energy balance even then, has `DIVERGED`.
 
-    With a fixed step, the run with half the step only confirms, and the first one is kept.
+    With a fixed step there is one repeat, with half the step. If it meets the same failure within the time of one step,
+    the failure is genuine; otherwise, or if it does not fail, the cell has `DIVERGED`. The state of the first run is
+    kept.
     """
     notes, rules, now = lives.notes[which], lives.cells.rules, lives.take(which)
     unsound, begun = failures.unsound(now), notes["halvings"] > 0
@@ -187,10 +190,10 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
     """Is it within its tolerance? The second run gives the error of the first (`sweep.engine.errors`).
 
     A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, until the error is below
-    `AIM` times the tolerance. A cell whose error stays above the tolerance has missed it, because the motion amplifies
-    round-off: two runs may then agree by chance, so its error is at least the spread of the spins of all its runs. (Of
-    four such cells, one claimed a 23rd of its error; the spread is 2.5 times too small.) With `tolerance: auto` this
-    tolerance is coarse, and the step is shortened until the count is certain as well.
+    `AIM` times the tolerance. A cell whose error stays above the tolerance has missed it, usually because the motion
+    amplifies round-off: two runs may then agree by chance, so its error is at least the spread of the spins of all its
+    runs. (Of four such cells, one claimed a 23rd of its error; the spread is 2.5 times too small.) With `tolerance:
+    auto` this tolerance is coarse, and the step is shortened until the count is certain as well.
 
     After a reversal that grew from round-off the error is unknown: the cell is not repeated because of it, nor said to
     miss its tolerance.
