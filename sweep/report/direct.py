@@ -85,13 +85,13 @@ def simulate(
     steps = methods.automatic_step(method, chosen, columns, tolerance)[0] if step is None else step
     stable = predict(chosen, Grid({}, {}, dict(columns))).ranges
     steps = np.broadcast_to(steps, cells).astype(float)
-    rows = kernel.start(columns, steps, t_end, stable)
     if decide:
         rules, each = Rules(t_end, tolerance, settles=settle), np.full(cells, tolerance)
-        rule = np.zeros(cells)
+        rule, rows = np.zeros(cells), kernel.initial(columns, stable)
         lives = Lives(Cells(chosen, rules, kernel, np.arange(cells), columns, steps, rule, each, stable, rows))
         live([lives])
         return Ends(kernel, lives.rows, t_end)
+    rows = kernel.start(columns, steps, t_end, stable)
     kernel.table(rows)["settles"] = settle
     execute(kernel, rows)
     return Ends(kernel, rows, t_end)
