@@ -4,10 +4,10 @@ Bodies and films are made by another program (`support.films`).  A campaign trie
 
     SWEEP_FILMS=0:20 SWEEP_SPOILT=0:10 python -m pytest -n0 -s -m campaign tests/studies/test_measured_films.py
 
-(with --timeout=0; a film takes two minutes of processor time).  Of the first 13 films of SWEEP_FILMS_SEED=64, 12
-intervals held the friction; the 14th, refused then, is believed now.  A film that begins late or a size off by a fifth
-often cannot be told from a right one: start and sizes make up for it within the noise.  So the second test passes for
-the film that it tries by default, and not for all.
+(with --timeout=0; a film takes two minutes of processor time).  Of ten films of SWEEP_FILMS_SEED=2405645420, eight
+intervals hold the friction, in the median 1.6 times as wide as with exact sizes; none of these films is refused.  A
+film that begins late or a size off by a fifth often cannot be told from a right one: start and sizes make up for it
+within the noise.  So the second test passes for the film that it tries by default, and not for all.
 """
 
 import os
