@@ -165,13 +165,13 @@ def lively_until(dataset: xr.Dataset) -> float:
     of a series other than heading and path, which change for ever.
     """
     last = max(_last_event(one) for one in each(dataset))
-    end = float(dataset["time"][-1])
+    end = float(dataset["time"].max())
     return min(_WHILE * last, end) if last else end
 
 
 def each(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """Return the trajectories of a dataset."""
-    listed = along_one(dataset)
+    """Return the trajectories of a dataset, in the order of time."""
+    listed = along_one(dataset).sortby("time")
     return [listed.isel({TRAJECTORIES: i}) for i in range(listed.sizes[TRAJECTORIES])]
 
 

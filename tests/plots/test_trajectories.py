@@ -101,6 +101,15 @@ def test_the_time_axis_ends_a_while_after_the_last_event() -> None:
     assert picture.plot(turning).axes[0].get_xlim() == (0, 100)
 
 
+def test_a_trajectory_backwards_in_time_is_the_same_picture() -> None:
+    dataset = made([60])
+    dataset["ripple_free_spin"] = dataset["spin"]
+    forwards, backwards = (picture.plot(each).axes[0] for each in (dataset, dataset.isel(time=slice(None, None, -1))))
+    drawn = [[line.get_xydata().tolist() for line in axes.lines] for axes in (forwards, backwards)]
+    assert drawn[0] == drawn[1]
+    assert 3 in map(len, drawn[0])  # the marks of three reversals
+
+
 def test_a_single_instant_has_an_axis() -> None:
     """That of a body which fails at once, for example."""
     figure = picture.plot(made([60]).isel(time=[0]))
