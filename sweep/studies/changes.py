@@ -59,14 +59,15 @@ class _Change:
 
 
 def advised(
-    config: Config, posed: Problem, free: Sequence[str], problem: Problem, best: Minimum, note: Note, *, compared: bool
-) -> tuple[str, float]:
+    config: Config, posed: Problem, free: Sequence[str], problem: Problem, best: Minimum, judged: verdict.Verdict,
+    note: Note, *, compared: bool,
+) -> tuple[str, float]:  # fmt: skip
     """Try changes one at a time; say which of them is most likely, and by how much it lowers Akaike's criterion.
 
-    `posed` is the problem that led to the `best` minimum of `problem`; `compared` says whether laws are compared.
+    `posed` is the problem that led to the `best` minimum of `problem`, which was `judged`; `compared` says whether laws
+    are compared.
     """
     before, kinds, film = _size(problem, best), list[str](), posed.film
-    judged = verdict.judged(problem, best)
 
     def silent(_: str) -> None: ...
 

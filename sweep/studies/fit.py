@@ -54,7 +54,7 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared
             at = problem.mirrored
             limits[..., at] = 1 - limits[:, ::-1][..., at]
         judged = verdict.judged(problem, best)
-        advice, gain = advised(config, posed, free, problem, best, note, compared=compared)
+        advice, gain = advised(config, posed, free, problem, best, judged, note, compared=compared)
         if judged.fits and gain > SURE:
             judged = judged._replace(reasons=["the film is far more likely with one change"])
     words = blind(problem, best) + ([_RUGGED] if rugged else [])
