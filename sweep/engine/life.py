@@ -6,10 +6,12 @@
      │                          ↓ no             ↓
      └─────────────── repeat with a shorter step ┘
 
-A run has one leg or two: it stops at the time `stop_early`, and goes on to `t_end` only if it can be predicted when it
-will be over. A run that fails makes an approach: it runs again from the start to a few steps ahead of the failure, and
-from there short steps show what it meets. A second run, with longer steps, goes to the end of the first; the difference
-of their spins gives the error. A repeat begins anew with a shorter step, and everything is decided again.
+A run has one leg or two: it stops at the time `stop_early`, and goes on to `t_end` only if the spin will reverse once
+more, or it can be predicted when it will be over. A run that fails makes an approach: it runs again from the start,
+with the same step, to a few steps ahead of the failure, and from there short steps show what it meets. A second run,
+with longer steps, goes to the end of the first; the difference of their spins gives the error, which is infinite if the
+second run fails. A repeat begins anew with a shorter step, and everything is decided again. The last run that is not a
+second one is the result.
 
 When a stage of a cell has ended, `next_of` says where the cell goes next; the queue (`sweep.engine.executor`) applies
 it. Each cell is judged by its own results alone, so nothing depends on which cells are with it.
@@ -82,9 +84,10 @@ def next_of(lives: Lives, which: Array) -> Going:
 def _after_run(lives: Lives, which: Array) -> Going:
     """Is it over? The slow equations predict what is left to come of the spin (`sweep.engine.over`).
 
-    A run that has settled too early goes on to the end of its leg. At a time limit, a run has settled if its spin will
-    reverse no more; if it will, and this was the first leg, the second one follows; if neither can be predicted, the
-    run ends there. A failed run makes an approach. Any other is judged at once: it has met nothing.
+    A run that has settled although its spin may reverse once more goes on from there to the end of its leg, and cannot
+    settle on the way. At the end of a leg a run has settled if its spin will surely reverse no more. If its spin will
+    reverse, or its rattle grows or winds down, the second leg follows the first. Otherwise, and at `t_end`, it ends
+    with `TIME_LIMIT`. A failed run makes an approach. Any other is judged at once: it has met nothing.
     """
     run, settles = lives.take(which), lives.cells.rules.settles
     left = over.predicted(run, at_limit=settles)
@@ -118,16 +121,19 @@ SAME = 1e-6
 def _judged(lives: Lives, which: Array, met: Met) -> Going:
     """Did it truly fail? The cells have ended, and `met` something, or nothing.
 
-    A failure is a statement about physics, which needs two runs: it is genuine if a repeat with half the step meets the
-    same failure at the same time. The row then gets its status, its time and the spin at that time, and the cell is
-    done. Otherwise the step is halved again. A run whose energy balance is off by more than `UNSOUND` is repeated as if
-    it had failed. As soon as a run is sound, it replaces the first, and the failures are forgotten. After the last
-    halving (`ROUNDS`) the same failure at another time suffices; a run that meets another one than the run before, or
-    has no energy balance even then, has `DIVERGED`.
+    A failure is a statement about physics, which needs two runs: it is genuine if the run before, with twice the step,
+    met the same failure at the same time. The row then gets its kind, its time and the spin at that time from the run
+    with the shorter step, and the cell is done, without a second run. Otherwise the cell is repeated with half the
+    step. So is a run whose energy balance is off by more than `failures.UNSOUND`, whether it failed or not. As soon as
+    a run is sound, it counts as the first from then on, with its step, and the failures are forgotten.
 
-    With a fixed step there is one repeat, with half the step. If it meets the same failure within the time of one step,
-    the failure is genuine; otherwise, or if it does not fail, the cell has `DIVERGED`. The state of the first run is
-    kept.
+    After `ROUNDS` halvings, or when half the step would need more than `MOST_STEPS`, the same failure at another time
+    suffices if the energy balance is sound. A run that meets another failure than the run before is halved up to
+    `FALSE_ROUNDS` times. What is still doubtful then has `DIVERGED`, and misses its tolerance.
+
+    With a fixed step, a failed run is repeated once, with half the step. If that meets the same failure within the time
+    of one step, the failure is genuine, and its time and spin are those of the repeat. Otherwise the cell has
+    `DIVERGED`, as has at once a run that did not fail but has no energy balance. The state of the first run is kept.
     """
     notes, rules, now = lives.notes[which], lives.cells.rules, lives.take(which)
     unsound, begun = failures.unsound(now), notes["halvings"] > 0
@@ -176,7 +182,8 @@ def _set_outcome(cells: Cells, table: Table, met: Met, before: Met, true: Array,
 def _run_twice(lives: Lives, which: Array) -> Going:
     """Run sound cells a second time, with longer steps, to the times at which they ended.
 
-    Where round-off decides when a cell ends, its second run goes to an end of its own.
+    Where a reversal grew from round-off, which makes its time and that of the end arbitrary, the second run goes to an
+    end of its own.
     """
     if not lives.cells.rules.twice:
         yield which, Done()
@@ -189,19 +196,24 @@ def _run_twice(lives: Lives, which: Array) -> Going:
 def _after_second_run(lives: Lives, which: Array) -> Going:
     """Is it within its tolerance? The second run gives the error of the first (`sweep.engine.errors`).
 
-    A step fixed by the configuration or by a search is kept. Otherwise the step is shortened, until the error is below
-    `AIM` times the tolerance. A cell whose error stays above the tolerance has missed it, usually because the motion
-    amplifies round-off: two runs may then agree by chance, so its error is at least the spread of the spins of all its
-    runs. (Of four such cells, one claimed a 23rd of its error; the spread is 2.5 times too small.) With `tolerance:
-    auto` this tolerance is coarse, and the step is shortened until the count is certain as well.
+    A step fixed by the configuration or by a search is kept. Otherwise the cell is repeated with a shorter step, until
+    the error is below `AIM` times what the tolerance permits. If it is above all that is permitted when no shorter step
+    is of use (`_shorter`), the cell has missed its tolerance, usually because the motion amplifies round-off: two runs
+    may then agree by chance, so its error is at least the spread of the spins at the ends of its first run and its
+    repeats. (Of four such cells, one claimed a 23rd of its error; its spread is 2.5 times too small.)
 
-    After a reversal that grew from round-off the error is unknown: the cell is not repeated because of it, nor said to
-    miss its tolerance.
+    With `tolerance: auto` this tolerance is coarse, and a cell is also repeated because its count is uncertain, until
+    its own tolerance is near `TOLERANCE`. From there on only the error of the spin decides, and a count may stay
+    uncertain.
+
+    After a reversal that grew from round-off the error is unknown: the cell is not repeated because of it, though it
+    may be because of its count, nor said to miss its tolerance.
     """
     first, second, notes = lives.take(which, lives.aside), lives.take(which), lives.notes
     found = compare(first, second, lives.left(which))
     coarse, count = first.rules.by_count & (first.tolerance > 2 * TOLERANCE), first.recorded(Reversals.name)
-    # Where errors are amplified, each repeat gives chance another try: so a count of 47 became certain that may be 40.
+    # A count that two fine runs do not share stays uncertain. Where errors are amplified, each repeat gives chance
+    # another try at two runs that agree: so a count of 47 became certain that may be 40.
     other = np.isfinite(notes["count"][which]) & (notes["count"][which] != count)
     found = found._replace(reversals=np.where(other, np.nan, found.reversals))
     permitted, known = allowed(first, first.rules.tolerance), ~limited_by_round_off(first)
@@ -230,8 +242,9 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
 def _of_count(run: Cells, errors: Errors) -> Array:
     """Return the factor by which errors of a coarse run have to fall for a count to be certain, shape (cells,).
 
-    It is infinite where this is unknown: with another count, or a spin that cannot be predicted beyond the first leg.
-    At another time limit a parity says nothing, because the spin may be about to reverse.
+    It is infinite where this is unknown: if the second run counts otherwise, or the spin cannot be predicted beyond the
+    first leg. A parity that contradicts the spin says nothing at a time limit, because the spin may be about to
+    reverse.
     """
     against, limited = doubted_counts(run, errors), run.status == TIME_LIMIT
     unpredicted = limited if run.rules.first_leg is not None else np.zeros(len(limited), bool)
