@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from traceback import extract_stack
 from typing import Any
 
@@ -43,8 +44,12 @@ class Layout:
     model: Any = None
     """The model whose states and constants are among them."""
 
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: place for place, name in enumerate(self.names)}
+
     def __contains__(self, name: str) -> bool:
-        return name in self.names
+        return name in self._places
 
     def index(self, name: str) -> int:
         """Index of a quantity: its column in the table of state rows, and its row in a group.
@@ -54,11 +59,11 @@ class Layout:
         CompileError
             if there is none of this name; it gives the place of whoever asked.
         """
-        if name not in self.names:
+        if name not in self._places:
             asked = next(each for each in reversed(extract_stack()) if each.filename != __file__)
             reason = f"no quantity {name!r} in the state rows{suggestion(name, self.names)}"
             raise CompileError([(asked.filename, asked.lineno or 1)], reason)
-        return self.names.index(name)
+        return self._places[name]
 
     def at(self, name: str) -> int:
         """Index at which the lanes of a quantity begin in a group, taken as one array."""
