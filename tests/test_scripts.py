@@ -81,6 +81,15 @@ def test_scripts_make_rows_of_the_reference_tables_again(monkeypatch: pytest.Mon
     assert f"{spins.as_decimals([found])[0]:.18g}" == row["spin"]
 
 
+def test_certain_counts_of_wide_cells_are_followed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("heyoka")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    import_module("wide_counts").main(4, 3, 5.0)
+    assert "{'followed': 2, 'false': 0, 'not followed': 2}" in capsys.readouterr().out
+
+
 def rows(table: str) -> list[dict[str, str]]:
     with (ROOT / "data" / table).open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
