@@ -123,7 +123,7 @@ def test_progress_may_be_a_function() -> None:
 
 
 def test_a_wrong_cell_of_a_trajectory_is_called_by_its_name() -> None:
-    with pytest.raises(InputError, match=r"^start point off the ellipsoid at x0=20"):
+    with pytest.raises(InputError, match=r"^at: start point off the ellipsoid at x0=20"):
         sweep.trajectory(SAID, at={"x0": 20})
     with pytest.raises(InputError, match=r"^at\.mu\[1\]: must be a finite number"):
         sweep.trajectory(SAID, at={"mu": [40, -1]})

@@ -198,7 +198,7 @@ def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int
 
     Uncertain parameters that `at` does not name take their median, or else each of the `samples`.
     """
-    config = load_config(config, {} if samples is None else {"samples": samples})
+    config = loaded = load_config(config, {} if samples is None else {"samples": samples})
     require_simulated(config)
     method = METHODS.get(config.integrator.method)
     # A fixed step meant for another method may be unstable with dopri5.
@@ -212,8 +212,9 @@ def choose(config: ConfigLike, at: Mapping[str, Any] | None = None, samples: int
     chosen = replace(config, parameters=parameters, cases=left, samples=drawn)
     if (cells := chosen.grid.size) > MAX_TRAJECTORIES:
         raise fault_of(f"{cells} trajectories are too many; choose at most {MAX_TRAJECTORIES} cells", "at")
-    if beyond := unfit(chosen) or misplaced(chosen):
-        raise fault_of(beyond)
+    for place, beyond in (("body",), unfit(chosen)), (("start", "x0"), misplaced(chosen)):
+        if beyond:
+            raise fault_of(beyond, "at") if at else loaded.error(place, beyond)
     return chosen
 
 

@@ -115,6 +115,8 @@ def test_critical_spins_of_the_others(write: Write) -> None:
 def test_a_trajectory_of_such_a_body_is_refused(write: Write) -> None:
     with pytest.raises(InputError, match="upright rest is not stable"):
         sweep.trajectory(write(TEXT), b=[0.9, 3.0], offset=0.05)
+    with pytest.raises(InputError, match=r"small\.yaml:2:1: body: "):
+        sweep.trajectory(write(TEXT))
 
 
 @pytest.mark.parametrize("body", [{"b": 1}, {"b": 0.7, "c": 0.7}, {"b": 0.9, "offset": 0.1899999999999}])
