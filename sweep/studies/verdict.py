@@ -1,4 +1,4 @@
-"""Judges a fit: whether its curve misses the film by noise alone, what is known, and what the film cannot show.
+"""Judges a fit: whether curve and film differ by noise alone, what is known, and what the film cannot show.
 
 The residuals of a correct curve are independent of each other. Their noise, estimated from third differences that
 remove slow variations, is then as large as they are, and neither their autocorrelation (Ljung and Box 1978, doi
@@ -83,18 +83,18 @@ def judged(problem: Problem, best: Minimum) -> Verdict:
     pulls = best.away[len(kept) :] / problem.scale
     odd, reasons = _oddity(problem, best, away) if size > 0 and np.isfinite(size) else 1.0, list[str]()
     if odd < _CHANCE:
-        by = f"{size / noise:.2g} times its noise" if size > 1.3 * noise > 0 else "more than noise"
-        reasons.append(f"the curve misses the film by {by}, and stays on one side of it for many rows")
+        by = f"{size / noise:.2g} times the noise" if size > 1.3 * noise > 0 else "more than noise"
+        reasons.append(f"curve and film differ by {by}, and in the same direction for many rows")
     if size > 0 and stats.kurtosis(away) > _TAILS * sqrt(24 / len(away)):
-        reasons.append("some rows are farther off the curve than noise brings them")
+        reasons.append("some rows lie farther from the curve than noise can explain")
     if problem.film.error is not None and stats.chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
-        reasons.append(f"the curve misses the film by {size:.3g} times its errors")
+        reasons.append(f"curve and film differ by {size:.3g} times the errors given in the film")
     if (left_out := int((~kept).sum())) > _SHARE * len(kept):
         reasons.append(f"{left_out} of {len(kept)} rows are outliers")
     if ends := pressed(problem, best):
-        reasons.append(f"{_all(ends)} would leave the range that was searched")
+        reasons.append(f"better values of {_all(ends)} lie outside the range searched")
     if off := np.array([*problem.free])[problem.measured][np.abs(pulls) > _FAR].tolist():
-        reasons.append(f"{_all(off)} would be more than {_FAR:g} errors from the measured value")
+        reasons.append(f"{_all(off)} would have to be more than {_FAR:g} errors from the measured value")
     return Verdict(reasons, size, noise, min(odd, stats.chi2.sf(pulls @ pulls, len(pulls)) if len(pulls) else 1.0))
 
 
@@ -191,13 +191,15 @@ def sentences(
 
 
 def _how(problem: Problem, verdict: Verdict, unit: str) -> str:
-    left = f", {counted(int((~problem.kept).sum()), 'outlier')} left out" if not problem.kept.all() else ""
+    rows = counted(int((~problem.kept).sum()), "outlier was", "outliers were")
+    left = "" if problem.kept.all() else f"; {rows} left out"
     if not verdict.fits:
         return f"The fit cannot be trusted: {'; '.join(verdict.reasons)}{left}."
     if problem.film.error is not None:
-        return f"The curve fits the film: it misses it by {verdict.size:.2g} times its errors{left}."
-    size = f"{verdict.size:.2g} {unit} (root mean square)"
-    return f"The curve fits the film: it misses it by {size}, which is noise{left}."
+        size = f"{verdict.size:.2g} times the film's errors"
+    else:
+        size = f"{verdict.size:.2g} {unit}"
+    return f"The curve fits the film: they differ by {size} (root mean square), which is noise{left}."
 
 
 def _known(config: Config, names: Sequence[str], values: Array, limits: Array, edge: Array) -> str:
@@ -208,7 +210,9 @@ def _known(config: Config, names: Sequence[str], values: Array, limits: Array, e
             words = config.described(name)["long_name"] if name in config.table else name
             phrases.append(f"{words} is {_digits(value, high - low)}{unit_after(config, name)} "
                         f"({_digits(low, high - low)} to {_digits(high, high - low)})")  # fmt: skip
-    return f"At 95 % confidence, {', '.join(phrases)}." if phrases else "It determines none of the free parameters."
+    if not phrases:
+        return "The film determines none of the free parameters."
+    return f"At 95 % confidence, {', '.join(phrases)}."
 
 
 def _digits(value: float, width: float) -> str:
@@ -232,7 +236,7 @@ def _unknown(names: Sequence[str], words: Sequence[str]) -> str:
             return f"But {tied[0]}; measure one of them independently."
         return "A film with a different start would test the law of friction."
     which = dict.fromkeys(next((film for some, film in _FILMS.items() if name in some), _SLIPPING) for name in names)
-    return f"It does not determine {_all(names)}; for that, {'; and '.join(which)}."
+    return f"The film does not determine {_all(names)}; for that, {'; and '.join(which)}."
 
 
 _SLIPPING = "film the body as it slips and reverses: with a faster spin, or more tilt at the start"

@@ -358,7 +358,7 @@ def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
     assert found.attrs["fits"] == 1
     assert found.attrs["noise"] == pytest.approx(NOISE, rel=0.15)
     how, known, unknown = found.attrs["verdict"].splitlines()
-    assert how == "The curve fits the film: it misses it by 0.00092 √(g/c) (root mean square), which is noise."
+    assert how == "The curve fits the film: they differ by 0.00092 √(g/c) (root mean square), which is noise."
     assert re.fullmatch(r"At 95 % confidence, friction μ is 5\d\.\d .* start spin n₀ is 0\.0519 .*\)\.", known)
     assert unknown == "A film with a different start would test the law of friction."
     assert found.edge.values.tolist() == [0, 0]
@@ -368,9 +368,9 @@ def test_a_right_curve_is_called_right(found: xr.Dataset) -> None:
 @pytest.mark.parametrize(
     ("given", "reason", "change"),
     [
-        ({"delta": 0.04}, "times its noise, and stays on one side of it for many rows", "correct delta = 0.03"),
-        ({"mu": [30.0, 48.0]}, "mu would leave the range that was searched", "widen the range of mu = 55"),
-        ({"b": {"normal": [3.2, 0.02]}}, "b would be more than 3.5 errors from the measured value", "correct b = 3 c"),
+        ({"delta": 0.04}, "times the noise, and in the same direction for many rows", "correct delta = 0.03"),
+        ({"mu": [30.0, 48.0]}, "better values of mu lie outside the range searched", "widen the range of mu = 55"),
+        ({"b": {"normal": [3.2, 0.02]}}, "b would have to be more than 3.5 errors from the meas", "correct b = 3 c"),
     ],
     ids=str,
 )
@@ -395,7 +395,7 @@ def test_outliers_are_left_out_and_widen_no_interval(write: Write) -> None:
     spins[[40, 170, 250]] += [10.0, -0.05, 0.008]
     found, again = (sweep.fit(write(SCENE), Film(TIMES, each), ["mu", "n0"]) for each in (FORMULA, spins))
     assert np.flatnonzero(again.outlier).tolist() == [40, 170, 250]
-    assert "3 outliers left out" in again.attrs["verdict"]
+    assert "; 3 outliers were left out." in again.attrs["verdict"]
     assert again.attrs["fits"] == 1
     above = draw(again).axes[0]
     (crosses,) = (line for line in above.lines if line.get_gid() == "outliers")
@@ -762,7 +762,7 @@ def test_the_film_of_a_phone_gives_its_friction(tmp_path: Path) -> None:
     film = ROOT / "data" / "phone_synthetic.csv"
     found = sweep.fit(tmp_path / "phone.yaml", film, ["mu", "sigma", "n0", "x0", "y0"])
     assert found.attrs["fits"] == 1
-    assert "2 outliers left out" in found.attrs["verdict"]
+    assert "; 2 outliers were left out." in found.attrs["verdict"]
     one = found.sel(parameter="mu")
     assert one.lower_95.item() < 0.22 < one.upper_95.item()
     assert one.upper_95.item() - one.lower_95.item() < 0.01
