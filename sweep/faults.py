@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
+import linecache
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import islice
 from os.path import exists
 from pathlib import Path as FilePath
 
@@ -137,6 +141,27 @@ def local_path(path: object, argument: str = "output", wanted: str = "the path o
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", address := os.fspath(path)):
         raise fault_of("an address, where only files of this machine are read and written; copy it here", file=address)
     return FilePath(path)
+
+
+def refusing(error: Exception) -> tuple[str, int] | None:
+    """Return the file and line of the function that Python did not call, if `error` says that arguments do not fit it.
+
+    The traceback ends where it is called, so that expression is evaluated again, without its arguments.
+    """
+    last = error.__traceback__
+    while last and last.tb_next:
+        last = last.tb_next
+    if not last or not isinstance(error, TypeError) or "argument" not in str(error):
+        return None
+    frame, file = last.tb_frame, last.tb_frame.f_code.co_filename
+    line, end, column, stop = next(islice(frame.f_code.co_positions(), last.tb_lasti // 2, None))
+    with suppress(Exception):  # whatever it is, the error itself is reported
+        for node in ast.walk(ast.parse("".join(linecache.getlines(file)))):
+            place = [getattr(node, each, None) for each in ("lineno", "end_lineno", "col_offset", "end_col_offset")]
+            if isinstance(node, ast.Call) and place == [line, end, column, stop]:
+                called = eval(compile(ast.Expression(node.func), file, "eval"), frame.f_globals, frame.f_locals)
+                return called.__code__.co_filename, called.__code__.co_firstlineno
+    return None
 
 
 class CompileError(RuntimeError):

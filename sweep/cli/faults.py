@@ -7,11 +7,12 @@ import os
 import sys
 from dataclasses import replace
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any, NoReturn
 
 import click
 
-from sweep.faults import CompileError, Error, Fault, InputError, fault_of, printable
+from sweep.faults import CompileError, Error, Fault, InputError, fault_of, printable, refusing
 from sweep.interrupt import INTERRUPTED
 
 DONE, ROWS_FAILED, WRONG_INPUT, TOO_MANY_FAILED = range(4)
@@ -83,5 +84,12 @@ class Commands(click.Group):
             say(str(error), err=True)
         except CompileError as error:  # of whoever edits the code: the place says more than a traceback
             say(str(error), err=True)
+            sys.exit(1)
+        except TypeError as error:
+            file, line = refusing(error) or ("", 0)
+            if not any(Path(file).is_relative_to(_PACKAGE / each) for each in ("models", "kernels")):
+                raise
+            *_, (frame, at) = walk_tb(error.__traceback__)  # a hook of whoever edits the code
+            say(f"{file}:{line}: {error}\n  called at {frame.f_code.co_filename}:{at}", err=True)
             sys.exit(1)
         sys.exit(WRONG_INPUT)

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cache
+from inspect import signature
 from typing import Any
 
+from sweep.faults import CompileError
 from sweep.jit import inline
 from sweep.kernels.layout import Layout, constants_of
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
@@ -81,9 +83,8 @@ def make_rest(n_states: int, spin_state: int):
 
 def call_all(name: str, arguments: str, functions: Sequence[Any]):
     """Compiled (arguments) -> None: calls each of `functions`; if there is none, it adds no instruction."""
-    calls = [f"f{i}({arguments})" for i in range(len(functions))] or ["pass"]
-    names = {f"f{i}": function for i, function in enumerate(functions)}
-    return compile_inline(name, arguments, calls, names)
+    calls, names = _calls(arguments, functions)
+    return compile_inline(name, arguments, calls or ["pass"], names)
 
 
 def all_true(name: str, arguments: str, functions: Sequence[Any]):
@@ -97,6 +98,23 @@ def any_true(name: str, arguments: str, functions: Sequence[Any]):
 
 
 def _joined(name: str, arguments: str, functions: Sequence[Any], operator: str, without: str):
-    calls = operator.join(f"f{i}({arguments})" for i in range(len(functions))) or without
-    names = {f"f{i}": function for i, function in enumerate(functions)}
-    return compile_inline(name, arguments, [f"return {calls}"], names)
+    calls, names = _calls(arguments, functions)
+    return compile_inline(name, arguments, [f"return {operator.join(calls) or without}"], names)
+
+
+def _calls(arguments: str, functions: Sequence[Any]) -> tuple[list[str], dict[str, Any]]:
+    """Return a call of each function, and the functions by the names that the calls have for them.
+
+    Raises
+    ------
+    CompileError
+        if a function does not take these arguments; Numba would say so only after seconds, without its line.
+    """
+    for function in functions:
+        try:
+            signature(function).bind(*arguments.split(", "))
+        except TypeError as error:
+            taken, code = f"{function.__name__}{signature(function)}", function.__code__
+            reason = f"{taken} is called with ({arguments}): {error}"
+            raise CompileError([(code.co_filename, code.co_firstlineno)], reason) from None
+    return [f"f{i}({arguments})" for i in range(len(functions))], {f"f{i}": each for i, each in enumerate(functions)}

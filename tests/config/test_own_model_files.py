@@ -67,6 +67,12 @@ BROKEN = {
                         "    @classmethod"),
     "a column": after(PENDULUM, 'cls(columns["damping"]', 'cls(columns["dampng"]', "KeyError: 'dampng'",
                       "        return cls"),
+    "an argument too few": after(PENDULUM, "def rhs(y, p)", "def rhs(y)", "rhs() takes 1 positional argument but 2",
+                                 "@inline"),
+    "an argument too many": (PENDULUM.replace("lambda columns: 2 +", "lambda columns, t: 2 +"),
+                             line_of(PENDULUM, "    fastest_motion"), "<lambda>() missing 1 required positional"),
+    "an argument of a method": after(PENDULUM, "def of(cls, columns)", "def of(cls)", "Constants.of() takes 1 pos",
+                                     "    @classmethod"),
     "name": after(PENDULUM, 'name="pendulum"', 'name="slip"', "invalid model name 'slip': use letters, digits"),
     "spin_state": after(PENDULUM, "spin_state=1", "spin_state=3", "and spin_state the index of one of them"),
     "offers": after(PENDULUM, "Offer.SPIN})", '"modes"})', "cannot offer modes; it may offer COUNT, SPIN, EN"),
@@ -79,6 +85,8 @@ BROKEN = {
     "decided": (PENDULUM.replace("MODEL =", "@inline\ndef decided(y, p):\n    return y[1]\n\n\nMODEL =")
                 .replace("spin_state=1,", "spin_state=1, decided=decided,"), line_of(PENDULUM, "MODEL ="),
                 "decided is neither true nor false; it has to be comparisons, joined by & and |"),
+    "a law's argument": after(FADING, "(square, p)", "(square)", "resistance() takes 1 positional argument but 2",
+                              "@inline"),
     "law": after(FADING, "resistance,\n", "3,\n", "'int' object is not callable"),
     "law without linear_to": (re.sub("        linear_to=.*\n", "", FADING), line_of(FADING, "@inline"),
                               "the resistance depends on the slip velocity; say by linear_to"),
@@ -216,7 +224,7 @@ MODEL = with_law(Law(
 
 
 @pytest.mark.parametrize("shape", [{"a": 0.2, "b": 0.03}, {"a": 0.05, "b": 0.45, "surface": "paraboloid"}], ids=str)
-def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_of_ours(
+def test_a_body_of_either_surface_slips_by_the_law_of_a_file_as_by_the_same_law_of_the_package(
     folder: Path, shape: dict[str, Any]
 ) -> None:
     """The motion, the step, and what settling depends on."""

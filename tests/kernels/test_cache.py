@@ -1,6 +1,7 @@
 """Compiled kernels are found again by later processes, and never after an edit of what they are made of."""
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -77,28 +78,30 @@ def edit(file: Path, old: str, new: str) -> None:
     os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
+CHECK, MAKE = "        def check(group, lane, seen):\n", "    def make_check(self, layout: Layout):\n"
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize(
-    ("place", "typed", "named"),
+    ("old", "new", "below", "words"),
     [
-        ("        def check(group, lane, seen):", "            gruop[0] = 1.0", "gruop"),
-        ("        def check(group, lane, seen):", "            group[lane] = np.nosuch(seen.spin)", "nosuch"),
-        (
-            "    def make_check(self, layout: Layout):",
-            '        layout.at("dnoe")',
-            "'dnoe' in the state rows (did you mean done?)",
-        ),
+        (CHECK, f"{CHECK}            gruop[0] = 1.0\n", 1, "does not compile: .*gruop"),
+        (CHECK, f"{CHECK}            group[lane] = np.nosuch(seen.spin)\n", 1, "does not compile: .*nosuch"),
+        (CHECK, CHECK.replace("seen", "sen"), 2, "does not compile: .*seen"),
+        (CHECK, CHECK.replace(", seen", ""), -1, r"does not compile: check\(group, lane\) is called with .*, seen\):"),
+        (MAKE, f'{MAKE}        layout.at("dnoe")\n', 1, r"does not compile: no quantity 'dnoe' .*did you mean done\?"),
+        (MAKE, MAKE.replace(", layout: Layout", ""), 0, r"Margin.make_check\(\) takes 1 positional argument but 2"),
     ],
-    ids=["name", "function", "quantity"],
+    ids=["name", "function", "argument", "missing argument", "quantity", "missing argument of the hook"],
 )
-def test_a_typo_in_a_hook_is_named_in_two_lines(place: str, typed: str, named: str, copy: Path, tmp_path: Path) -> None:
+def test_a_typo_in_a_hook_is_named_in_two_lines(
+    old: str, new: str, below: int, words: str, copy: Path, tmp_path: Path
+) -> None:
     margin = copy / "sweep" / "kernels" / "measures" / "margin.py"
-    lines = (ROOT / margin.relative_to(copy)).read_text(encoding="utf-8").splitlines()
-    line = lines.index(place) + 2
-    lines.insert(line - 1, typed)
-    margin.write_text("\n".join(lines), encoding="utf-8")
+    text = (ROOT / margin.relative_to(copy)).read_text(encoding="utf-8")
+    margin.write_text(text.replace(old, new), encoding="utf-8")
+    line = 1 + text[: text.index(old)].count("\n") + below
     scene = ["-m", "sweep", "run", ROOT / "configs" / "quick.yaml", "--quiet", "--set", "integrator.method=dopri5"]
     said = python(*scene, "--output", tmp_path, folder=copy, code=1, NUMBA_CACHE_DIR="").stderr.splitlines()
     assert len(said) == 2
-    assert said[0].startswith(f"{margin}:{line}: does not compile: ")
-    assert named in said[0]
+    assert re.match(f"{re.escape(str(margin))}:{line}: {words}", said[0]), said

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from os.path import abspath
 
-from sweep.faults import InputError, fault_of
+from sweep.faults import InputError, fault_of, refusing
 from sweep.jit import compiler_said
 from sweep.models.origin import Origin
 
@@ -30,7 +30,7 @@ def _line(error: Exception, origin: Origin) -> int | None:
     """Line in the user's code, from Python's traceback or Numba's message; None if the error comes from elsewhere."""
     chain = filter(None, (error, error.__cause__))
     lines = [(f.f_code.co_filename, n) for each in chain for f, n in traceback.walk_tb(each.__traceback__)]
-    lines += compiler_said(error)[0]
+    lines = [*filter(None, [refusing(error)]), *lines, *compiler_said(error)[0]]
     found = [n for file, n in lines if abspath(file) == abspath(origin.place)]
     return found[-1] if found else None
 
