@@ -353,7 +353,10 @@ def write(path: Path, found: dict[float, list[Entry]]) -> None:
 
 
 def draw(table: Path, picture: Path) -> None:
-    """Draw speed against error from the table, a panel for each friction, as wide as a page of the documentation."""
+    """Draw speed against error from the table, a panel for each friction, as wide as a page of the documentation.
+
+    The times are those of the fastest runs, which other work on the machine has slowed least.
+    """
     from matplotlib.figure import Figure
 
     with table.open(encoding="utf-8", newline="") as stream:
@@ -363,9 +366,11 @@ def draw(table: Path, picture: Path) -> None:
     grid = figure.subplots(1, len(frictions), sharey=True, squeeze=False).ravel()
     for axes, mu in zip(grid, frictions, strict=True):
         for tool, (colour, dash, marker, face) in CURVES.items():
-            some = [(float(row["largest_error"]), float(row["ms_per_trajectory"]))
+            some = [(float(row["largest_error"]), float(row["ms_least"]))
                     for row in rows if (row["mu"], row["tool"]) == (mu, tool)]  # fmt: skip
-            errors, times = zip(*sorted(some, key=lambda pair: pair[1]), strict=True) if some else ((), ())
+            if not some:
+                continue
+            errors, times = zip(*sorted(some), strict=True)
             axes.loglog(errors, times, color=colour, linestyle=dash, marker=marker, markersize=4.5,
                         markerfacecolor=face or colour, linewidth=1.2, label=tool)  # fmt: skip
         axes.set(title=f"μ = {mu}", xlabel="largest error in spin", xlim=(2e-13, 1e-3))
