@@ -254,7 +254,7 @@ def fastest_period(case: Case) -> float:
 
 
 def radau_run(case: Case, times: Array, edges: Array, steps: int) -> tuple[Array, Array, float]:
-    """As `Taylor.run`, with so many steps a period, and the least normal force by weight, seen at all of them."""
+    """As `Taylor.run`, with `steps` steps a period, and the least normal force by weight, seen at all of them."""
     states, rhs, seen = package_equations(case)
     longest, stops = fastest_period(case) / steps, np.union1d(times, edges)
     passed = [Extended(0)] if rolls(case) else [t for t in first_times(case, longest) if t < stops[0]]

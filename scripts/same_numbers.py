@@ -99,7 +99,7 @@ def _attributes(place: str, before: netCDF4.Dataset, after: netCDF4.Dataset) -> 
 
 
 def meant(difference: str) -> bool:
-    """Tell whether a difference is one that is left aside: no value of a variable that both datasets have."""
+    """Return whether a difference is left aside: no value of a variable that both datasets have."""
     return difference.rpartition(":")[2] in WORDS or any(fnmatch(difference, pattern) for pattern in OTHERS)
 
 

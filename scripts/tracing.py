@@ -18,7 +18,7 @@ def traced_rhs(model: Model, sqrt: Callable[[Any], Any]) -> Callable[..., Any]:
 
 
 def taylor_system(model: Model, scale: Sequence[float] | None = None) -> tuple[list[tuple[Any, Any]], tuple[Any, ...]]:
-    """The equations of `model` for heyoka, and what else its right-hand side tells, as symbols.
+    """The equations of `model` for heyoka, and what else its right-hand side gives, as symbols.
 
     Its constants are heyoka's parameters, in their order; its states are in multiples of `scale`, by default of one.
     """

@@ -175,7 +175,7 @@ def test_a_notebook_shows_progress_unasked_and_others_where_it_is_asked_for(
     shell: dict[str, None] | None, asked: dict[str, bool], shown: bool,
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    """In a notebook whose kernel lacks ipywidgets; a prompt of IPython is none."""
+    """In a notebook whose kernel lacks ipywidgets; IPython's prompt is not a notebook."""
     if shell is not None:
         ipython = types.SimpleNamespace(get_ipython=lambda: types.SimpleNamespace(**shell))
         monkeypatch.setitem(sys.modules, "IPython", ipython)

@@ -51,7 +51,7 @@ def beyond(graph: grimp.ImportGraph, rooms: list[str]) -> set[str]:
     return {name.partition(".")[0] for name in reached} - own
 
 
-def test_each_room_imports_its_own_packages(graph: grimp.ImportGraph) -> None:
+def test_each_package_imports_only_the_libraries_listed_for_it(graph: grimp.ImportGraph) -> None:
     assert foreign(graph) == FOREIGN
 
 

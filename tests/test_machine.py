@@ -1,6 +1,6 @@
 """Any combination of features holds what each promises: a machine draws them, from what the program says of itself.
 
-The same ones each time.  Of a campaign, `SWEEP_MACHINE_SEED` draws others (a number, or `new`); a number that is given
+The same ones each time.  In a campaign, `SWEEP_MACHINE_SEED` draws others (a number, or `new`); a number that is given
 also shrinks what fails, which takes minutes.  `SWEEP_MACHINE_RUNS` and `SWEEP_MACHINE_KERNELS` make it larger.  What
 must hold is in tests/machine/.
 """
@@ -98,7 +98,7 @@ def test_many_combinations_in_the_explorer() -> None:
 
 @pytest.mark.parametrize("path", sorted(PATHS))
 def test_each_key_of_a_configuration_is_drawn(path: str) -> None:
-    """With a shipped configuration, or with one other choice beside the paper's, some drawn value is accepted."""
+    """With a shipped configuration, or with one choice that differs from the paper's, some drawn value is accepted."""
     others = [(name, flat) for name, flat in draws.shipped().items()]
     words = [(key, word) for key, field in draws.fields().items() for word in field.get("enum", ())]
     others += [("paper", draws.shipped()["paper"] | {key: word}) for key, word in words]

@@ -32,7 +32,7 @@ def test_reversal_counts_agree_with_the_reference() -> None:
     [("adams", 25), pytest.param("adams", 1, marks=pytest.mark.campaign),
      pytest.param("dopri5", 5, marks=pytest.mark.release)],
 )  # fmt: skip
-def test_firm_counts_of_500_random_cells_agree(method: str, every: int) -> None:
+def test_certain_counts_of_500_random_cells_agree(method: str, every: int) -> None:
     """Firm are counts that no round-off decides."""
     rows = np.genfromtxt(ROOT / "data" / "reference_counts_500.csv", delimiter=",", names=True, dtype=None)
     assert (len(rows), rows["firm"].sum()) == (500, 499)

@@ -19,7 +19,7 @@ has to vanish: the model does not offer `Offer.LINEAR`, gives its `fastest_motio
 `decided` says so.
 
 `constants.of`, `start` and `energy` are called when a run is prepared, `rhs` in every stage of a step, and `energy`
-again at every look.  The linear theory (`sweep.models.theory.linear`) calls `upright` and `rhs`, the latter with
+again at every check.  The linear theory (`sweep.models.theory.linear`) calls `upright` and `rhs`, the latter with
 complex states.
 
 Units: lengths in c, times in sqrt(c/g), spins in sqrt(g/c), the mass is one.  Equations that hold in any units give the
@@ -207,7 +207,7 @@ class Model(Tier):
     # When a trajectory may end because its spin can reverse no more, apart from the linear theory.
     decided: Callable[..., Any] = never_decided
     """Inline, (states, constants) -> whether the spin can reverse no more, so that the trajectory settles, whatever the
-    linear theory says; by default it adds no instruction.  It is evaluated at every look."""
+    linear theory says; by default it adds no instruction.  It is evaluated at every check."""
     faint: str = ""
     """Name of the constant that is the energy of the rattle below which friction is linear; "" if it always is.  Only a
     rattle below it may settle."""

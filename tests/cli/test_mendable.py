@@ -1,4 +1,4 @@
-"""What ends a command: a fault of the user is one line, before anything is computed; ours shows its traceback."""
+"""How a command ends: a user's error is one line, before anything is computed; a bug shows its traceback."""
 
 import errno
 import sys
@@ -36,7 +36,9 @@ OURS = [
 
 
 @pytest.mark.parametrize("error", OURS, ids=repr)
-def test_an_error_of_ours_shows_its_traceback(error: Exception, file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_the_program_shows_its_traceback(
+    error: Exception, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for verb, target in (("info", "sweep.results.summary.describe"), ("plot", "sweep.plots.picture.plot")):
         monkeypatch.setattr(target, Mock(side_effect=error))
         with pytest.raises(type(error)):

@@ -114,7 +114,7 @@ def test_a_longer_run_is_advised_only_if_some_cells_settle() -> None:
         assert ("raise t_end" in text) == advised
 
 
-def test_a_status_that_was_averaged_is_no_status() -> None:
+def test_an_averaged_status_is_not_a_status() -> None:
     assert summary(status=("mu", [1.5, 2.0])) == "no status of individual cells: averaged"
 
 

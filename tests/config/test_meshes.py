@@ -83,7 +83,7 @@ OUT = pebble()[:, ::-1]
 CORE, MIDDLE = (0.02, 0.01, 0.005), (0.3, -0.2, 0.983)
 
 
-def test_a_hollow_is_no_mass_and_triangles_that_all_face_inwards_are_turned() -> None:
+def test_a_cavity_has_no_mass_and_triangles_that_all_face_inwards_are_turned() -> None:
     whole, other, hollow = map(shape, (OUT, pebble(), np.concatenate([OUT, box(CORE, MIDDLE)[:, ::-1]])))
     assert other.spec["volume"] == pytest.approx(whole.spec["volume"], rel=1e-12)
     assert whole.spec["volume"] - hollow.spec["volume"] == pytest.approx(1e-6, rel=1e-9)
@@ -112,7 +112,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("words", WRONG)
-def test_what_is_no_standing_solid_is_refused(words: str) -> None:
+def test_a_shape_that_is_not_a_standing_solid_is_refused(words: str) -> None:
     with pytest.raises(ValueError, match=words):
         shape(WRONG[words])
 

@@ -179,7 +179,7 @@ def test_a_file_that_cannot_be_read(name: str, said: str, tmp_path: Path) -> Non
     assert invoke("run", tmp_path / name).stderr == f"{tmp_path / name}: {said}\n"
 
 
-def test_an_address_is_no_file_in_python() -> None:
+def test_an_address_is_not_a_file_in_python() -> None:
     for call in (sweep.load_config, sweep.open_dataset, sweep.plot, lambda at: sweep.run({}, at, mu=60)):
         with pytest.raises(InputError, match=f"^s3://here/x: {FAR}$"):
             call("s3://here/x")
@@ -189,13 +189,13 @@ FAR = "an address, where only files of this machine are read and written; copy i
 
 
 @pytest.mark.parametrize("mark", [b"\x89HDF\r\n\x1a\n", b"CDF\x02"])
-def test_a_dataset_is_no_configuration(mark: bytes, tmp_path: Path) -> None:
+def test_a_dataset_is_not_a_configuration(mark: bytes, tmp_path: Path) -> None:
     (tmp_path / "x.nc").write_bytes(mark + bytes(100))
     said = "x.nc: a dataset, not text; its attribute `config` holds the configuration, and `sweep info` describes it"
     refused(invoke("run", tmp_path / "x.nc"), said)
 
 
-def test_a_spreadsheet_is_no_table(write: Write, tmp_path: Path) -> None:
+def test_a_spreadsheet_is_not_a_table(write: Write, tmp_path: Path) -> None:
     (tmp_path / "cells.xlsx").write_bytes(b"PK\x03\x04\0")
     refused(invoke("run", write("cases: cells.xlsx\n")), "a spreadsheet or another archive, not text; save it as CSV")
 

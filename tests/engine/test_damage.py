@@ -101,7 +101,7 @@ QUICK = ("cut0.4", "another's")
 @pytest.mark.parametrize(
     "how", [how if how in QUICK else pytest.param(how, marks=pytest.mark.campaign) for how in DAMAGES]
 )
-def test_damaged_tiles_and_images_are_computed_again(
+def test_damaged_tiles_and_state_rows_are_computed_again(
     config: Path, out: Path, undisturbed: dict[str, bytes], how: str
 ) -> None:
     files = sorted((out / "small.checkpoint").glob("*.npz"))

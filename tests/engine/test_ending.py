@@ -26,7 +26,7 @@ def run() -> xr.Dataset:
     return sweep.run(SCENE)
 
 
-def test_a_cell_goes_on_if_a_reversal_can_be_predicted(run: xr.Dataset) -> None:
+def test_a_cell_continues_if_a_reversal_can_be_predicted(run: xr.Dataset) -> None:
     ended = sweep.run(SCENE, t_end=30_000.0)
     assert list(ended.status) == [TIME_LIMIT, TIME_LIMIT, SETTLED]
     assert list(run.status) == [SETTLED, SETTLED, SETTLED]
@@ -59,7 +59,7 @@ def test_a_strong_rattle_that_hardly_decays_does_not_let_a_cell_settle() -> None
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_an_interrupted_run_goes_on_there_too(run: xr.Dataset, tmp_path: Path) -> None:
+def test_an_interrupted_run_continues_there_too(run: xr.Dataset, tmp_path: Path) -> None:
     found, interruptions, _ = in_sittings(100, SCENE, tmp_path)
     assert interruptions > 1
     same_numbers(found, run)
@@ -103,7 +103,7 @@ def test_no_certain_count_contradicts_the_spin(name: str) -> None:
     assert (found.certain == 1).sum() > 20
 
 
-def test_settled_trajectories_stay_where_they_are_said_to() -> None:
+def test_settled_trajectories_stay_where_predicted() -> None:
     settings: dict[str, Any] = {"b": [2.0, 3.0], "mu": [40, 70], "n0": 0.05, "x0": 0.01, "y0": 0.01}
     settings |= {"t_end": 30_000, "method": "adams", "measure": list(default_measures("slip"))}
     quick = ROOT / "configs" / "quick.yaml"

@@ -145,7 +145,7 @@ def test_what_adams_foresaw_is_not_taken_over(write: Write) -> None:
 
 
 @pytest.mark.usefixtures("short_chunks")
-def test_an_interrupted_enlargement_goes_on(write: Write, files: Files, tmp_path: Path) -> None:
+def test_an_interrupted_enlargement_continues(write: Write, files: Files, tmp_path: Path) -> None:
     files(ONE, tmp_path / "out")
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
@@ -208,7 +208,7 @@ def test_nothing_is_taken_from_an_edited_dataset(how: str, write: Write, files: 
         grown(write, tmp_path / "out", text, n0=[0.02, 0.03, 0.05])
 
 
-def test_a_part_of_a_dataset_is_no_complete_run(write: Write, files: Files, tmp_path: Path) -> None:
+def test_a_part_of_a_dataset_is_not_a_complete_run(write: Write, files: Files, tmp_path: Path) -> None:
     there = sweep.open_dataset(files(by("dopri5", ONE), tmp_path / "out") / "small.nc")
     there.isel(mu=[0]).to_netcdf(tmp_path / "out" / "small.nc")
     found, notes = grown(write, tmp_path / "out", by("dopri5", ONE))

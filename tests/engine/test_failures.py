@@ -52,7 +52,7 @@ def test_true_failures_have_their_time_and_spin(method: str) -> None:
         (STIFF, "adams", 14.5, "Radau", 1e-7),
     ],
 )
-def test_a_false_paradox_is_gone_on_from(
+def test_a_run_continues_after_a_false_paradox(
     body: dict[str, float], method: str, t_end: float, by: str, off: float
 ) -> None:
     found = run_cells([body], method=method, t_end=t_end)

@@ -183,7 +183,7 @@ def test_a_model_with_an_upright_spin_settles_by_the_linear_theory(folder: Path)
     assert -np.log(1e-4) < slow < -2 * np.log(1e-4)
 
 
-def test_the_linear_theory_of_a_model_is_that_of_ours(folder: Path) -> None:
+def test_the_linear_theory_of_a_users_model_agrees_with_that_of_the_package(folder: Path) -> None:
     (folder / "mine.py").write_text(UPRIGHT, encoding="utf-8")
     scene = {"friction": {"mu": [5.0, 60.0]}, "start": {"n0": [0.03, -0.1]}}
     config = load_config({"model": str(folder / "mine.py"), **scene})

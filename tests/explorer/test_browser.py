@@ -444,7 +444,7 @@ def test_no_cell_is_shown_along_other_axes(opened: xr.Dataset) -> None:
 # ---- trajectories
 
 
-def test_news_of_a_page_that_is_gone_end_its_run_alone(opened: xr.Dataset) -> None:
+def test_a_page_that_is_gone_ends_only_its_own_run(opened: xr.Dataset) -> None:
     """Bokeh takes the document apart first; the thread of the trajectories, which all pages share, has to go on."""
     (document, view), job = document_of(opened), Job({}, lambda _: None)
     document.callbacks.destroy()

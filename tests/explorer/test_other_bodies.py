@@ -59,7 +59,7 @@ def test_a_size_of_a_solid_with_weights_can_be_changed() -> None:
     np.testing.assert_array_equal(last.dataset[COUNT], expected.transpose(*last.dataset[COUNT].dims))
 
 
-def test_a_value_stands_for_those_beside_it_on_a_long_axis() -> None:
+def test_a_value_represents_its_neighbours_on_a_long_axis() -> None:
     source, setup = a_source(friction={"mu": {"start": 20, "stop": 120, "num": 130}}, body={"b": 3})
     shown = replace(state.first(source), changed={"a": 11.0})
     _, fine, *_, last = dict.fromkeys(bodies.counts(setup, source, shown))

@@ -47,7 +47,7 @@ class Heard(Job):
         return self
 
 
-def test_a_curve_goes_on_where_a_sweep_ends(setup: Setup) -> None:
+def test_a_curve_continues_where_a_sweep_ends(setup: Setup) -> None:
     """A spin below 1.5 n_c1 settles within a few units of time, and is seen nevertheless."""
     cell = {**setup.base, "mu": 75.0, "b": 3.0, "n0": -0.006}
     assert sweep.trajectory(setup.config, at=cell, stop_early=True)["t_stop"].item() < 10
@@ -117,7 +117,7 @@ def test_what_cannot_be_run_is_reported(setup: Setup) -> None:
     assert "x0" in job.wait().fault
 
 
-def test_nothing_is_heard_of_dropped_jobs(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dropped_jobs_report_nothing(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
     """The running one ends at its next chunk, and the waiting one is never begun."""
     begun, inside, go_on = list[float](), threading.Event(), threading.Event()
 

@@ -241,7 +241,7 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return cells
 
 
-def test_no_looks_where_no_skip_can_help(looks: list[int]) -> None:
+def test_there_are_no_checks_where_no_skip_can_help(looks: list[int]) -> None:
     """A look takes as long as two thousand steps: to t = 400 they were two thirds of the time."""
     finish(ADAMS, started(ADAMS, 0.1, 400.0, mu=[60.0, 200.0, 1000.0]), settle=False)
     assert not looks

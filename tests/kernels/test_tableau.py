@@ -15,7 +15,7 @@ Tree = tuple["Tree", ...]
 
 
 def trees(order: int) -> set[Tree]:
-    """All rooted trees of so many nodes."""
+    """All rooted trees with `order` nodes."""
     return {grown for tree in trees(order - 1) for grown in _grown(tree)} if order > 1 else {()}
 
 

@@ -78,7 +78,7 @@ MEASURED: Flat = {
 
 @cache
 def shipped() -> dict[str, Flat]:
-    """The configurations that come with the package and need no code of a user, and two more; two values an axis."""
+    """The configurations that come with the package and need no user-defined code, and two more; two values an axis."""
     found: dict[str, Flat] = {"paper": {"friction.mu": 60}, "measured": dict(MEASURED)}
     for file in sorted((ROOT / "configs").glob("*.yaml")):
         flat = flattened(YAML(typ="safe").load(file.read_text(encoding="utf-8")))
@@ -224,7 +224,7 @@ Piece = tuple[str, str, tuple[str, ...]]
 """Method, model and specs of measurements."""
 
 MOST_CELLS, MOST_STEPS = 40, 5e5
-"""Of a run; a fraction of a second."""
+"""Length of a run, which takes a fraction of a second."""
 
 
 def kernels(config: Config) -> set[Piece]:

@@ -101,7 +101,7 @@ class Machine(RuleBasedStateMachine):
     far: ClassVar[bool] = False
     """Whether kills, fits and animations are drawn, which take seconds."""
     client: ClassVar[Any] = None
-    """Of a dask cluster, if cells are to be run there too."""
+    """The client of a dask cluster, if cells are run there too."""
     browser: ClassVar[bool] = False
     """Whether documents of the explorer are built."""
     done: ClassVar[int] = 0

@@ -92,7 +92,7 @@ def arguments(function: str, drawn: Draws) -> dict[str, Any]:
 
 
 _MINE = ("config", "source", "dataset", "film", "free", "output", "client", "progress", "overrides", "ax")
-"""Arguments that the machine gives, or that need an object of the user."""
+"""Arguments that the machine gives, or that need an object that a user makes."""
 
 TAKEN = {name: [each for each in known if each not in _MINE] for name, known in FUNCTIONS.items()}
 """The arguments of each function that are drawn."""

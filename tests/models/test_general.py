@@ -111,7 +111,7 @@ def test_frequencies_are_those_of_the_equations(name: str, body: dict[str, float
 
 
 def test_the_ripple_free_spin_of_a_real_body_hardly_ripples() -> None:
-    """Of a small rolling rattle at n = 0 only terms of higher order are left."""
+    """A small rolling rattle at n = 0 leaves only terms of higher order."""
     model, constants = one("noslip+solid", KANE_LEVINSON)
     u, omega = np.array([3e-4, -2e-4]), np.array([4e-3, 1e-3])
     y = np.array([*u, *omega, u @ omega])

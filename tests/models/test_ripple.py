@@ -39,7 +39,7 @@ def scatter(model: Model, start: np.ndarray, body: dict[str, np.ndarray]) -> tup
 @pytest.mark.parametrize("c", [1.0, 1.7])
 @pytest.mark.parametrize(("name", "left"), [("noslip", 1e-5), ("slip", 0.02), ("effective", 1e-5)])
 def test_no_ripple_is_left(name: str, left: float, c: float) -> None:
-    """Of a small rattle at n = 0.  Friction, here μ = 200, leaves a hundredth."""
+    """For a small rattle at n = 0.  Friction, here μ = 200, leaves a hundredth."""
     body = columns(b=5.0, c=c, mu=1e9 if name == "effective" else 200.0)
     start = rolling(1e-4 * np.array([0.7, 0.9, 7.0, 4.0]), body)
     if name == "effective":

@@ -29,7 +29,7 @@ def columns(**given: Any) -> dict[str, np.ndarray]:
 
 
 def test_the_matrix_has_the_eigenvalues_of_the_full_model() -> None:
-    """At spins between those through which its polynomials go, also where the modes nearly meet."""
+    """At spins between those through which its polynomials go, even where the modes nearly meet."""
     for b in (2.0, 5.0, 9.4):
         body = columns(b=b)
         p = slip.MODEL.constants.of(body)

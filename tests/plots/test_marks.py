@@ -48,14 +48,14 @@ def test_predictions_and_statuses_have_no_marks_of_failure(cells: xr.Dataset) ->
         assert not any(where.any() for where in marks(cells, name).values())
 
 
-def test_a_missing_value_of_a_sound_run_is_no_failure(cells: xr.Dataset) -> None:
+def test_a_missing_value_of_a_sound_run_is_not_a_failure(cells: xr.Dataset) -> None:
     kinds = marks(cells, "t_last_reversal")
     assert kinds["no_value"].values.nonzero()[0].tolist() == [5]
     assert "no reversal (1)" in legend(cells, "t_last_reversal").values()
     np.testing.assert_array_equal(np.any([kinds[kind] for kind in BLANK], axis=0), cells["t_last_reversal"].isnull())
 
 
-def test_a_final_spin_is_no_lower_bound(cells: xr.Dataset) -> None:
+def test_a_final_spin_is_not_a_lower_bound(cells: xr.Dataset) -> None:
     words = legend(cells, "spin_final")
     assert words["time_limit"] == "not settled: time limit (1)"
     assert "uncertain" not in words

@@ -151,7 +151,7 @@ def test_lower_bounds_are_hatched_and_explained() -> None:
 
 
 @pytest.mark.parametrize(("limited", "settled"), [(4, True), (6, True), (10, False)])
-def test_what_most_cells_share_is_a_sentence_and_no_hatch(limited: int, settled: bool) -> None:
+def test_a_mark_that_most_cells_share_is_a_sentence_instead_of_a_hatch(limited: int, settled: bool) -> None:
     """A model that never settles has no lower bounds."""
     dataset = made()
     dataset["status"][:] = SETTLED

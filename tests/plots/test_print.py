@@ -53,7 +53,7 @@ def test_a_figure_for_print_is_as_wide_as_asked_and_can_be_read(kind: str, width
 
 @pytest.mark.parametrize("starts", [1, 2, 3, 8])
 @pytest.mark.parametrize("variable", [None, "difference"])
-def test_a_figure_for_a_column_has_one_bar_and_is_no_page(starts: int, variable: str | None) -> None:
+def test_a_figure_for_a_column_has_one_bar_and_is_smaller_than_a_page(starts: int, variable: str | None) -> None:
     figure = picture.plot(made(n0=np.linspace(0.02, 0.1, starts)), variable, x="b", y="mu", width="85mm")
     panels = [axes for axes in figure.axes if axes.get_label() == ""]
     assert len(panels) == starts
@@ -91,7 +91,7 @@ def test_a_figure_is_laid_out_once(width: str | None, tmp_path: Path, monkeypatc
     assert layouts == [figure]
 
 
-def test_a_width_without_room_is_refused_with_one_that_has(tmp_path: Path) -> None:
+def test_too_small_a_width_is_refused_with_one_that_suffices(tmp_path: Path) -> None:
     with mpl.rc_context({"font.size": 16}):
         with pytest.raises(InputError, match=r"^width: too narrow for this figure; give ") as refused:
             picture.plot(made(), width="50mm")

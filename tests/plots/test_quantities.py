@@ -83,9 +83,7 @@ def test_a_picture_depends_on_what_is_named_and_not_on_what_is_measured_first(pi
     ("lacking", "variable"),
     [(["reversals"], "t_first_reversal"), (["reversals", "reversals_predicted", "reversal_times"], "spin_final")],
 )
-def test_without_reversals_it_is_the_first_of_what_is_there(
-    lacking: list[str], variable: str, whole: xr.Dataset
-) -> None:
+def test_without_reversals_the_first_variable_is_drawn(lacking: list[str], variable: str, whole: xr.Dataset) -> None:
     assert subject(whole.drop_vars([*lacking, "reversals_predicted"], errors="ignore")) == variable
 
 
@@ -171,7 +169,7 @@ def test_a_bar_has_arrows_where_values_lie_beyond(
     assert variable != "ratio" or bars[-1].get_yticklabels()[2].get_text() == "1"
 
 
-def test_what_is_not_predicted_is_no_missing_reversal(whole: xr.Dataset) -> None:
+def test_a_missing_prediction_is_not_a_missing_reversal(whole: xr.Dataset) -> None:
     whole["t_first_reversal_predicted"][:, :2] = np.nan
     figure = picture.plot(whole, "ratio")
     assert "no reversal, or none predicted (12)" in entries(figure)
@@ -221,7 +219,7 @@ def test_pictures_of_another_dataset_are_removed(tmp_path: Path, write: Write) -
     assert set(pictures(tmp_path)) == {"map.png"}
 
 
-def test_pictures_are_no_part_of_what_a_run_is() -> None:
+def test_pictures_do_not_identify_a_run() -> None:
     asked = {"friction": {"mu": [20, 60]}}
     plain, named = load_config(asked), load_config(asked, {"picture": ["spin_mean"]})
     assert plain.fingerprint() == named.fingerprint()

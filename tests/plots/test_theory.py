@@ -1,4 +1,4 @@
-"""Lines where counts change, and those of theory, beside the formulas and eigenvalues of the bodies that they pass.
+"""Lines where counts change, and lines of theory, compared with formulas and eigenvalues of the bodies that they pass.
 
 And where their numbers and symbols stand.
 """
@@ -123,7 +123,7 @@ def test_numbers_of_close_lines_are_apart() -> None:
     assert np.diff(places).min() > 0.06
 
 
-def test_small_parts_have_no_number_beside_large_ones() -> None:
+def test_small_parts_next_to_large_ones_have_no_number() -> None:
     island = across(0.8, 5, 8)
     assert numbers([across(0.3), island, across(0.6)]) == [(MU.values[10], 0.3, "1"), (MU.values[10], 0.6, "1")]
     assert numbers([island]) == [(MU.values[6], 0.8, "1")]

@@ -55,7 +55,7 @@ def rounds(folder: Path) -> int:
 @pytest.mark.parametrize(
     "wanted", [range(1, 6, 2), pytest.param(range(12), marks=pytest.mark.campaign)], ids=["some", "many"]
 )
-def test_a_stopped_search_goes_on(runs: Runs, undisturbed: xr.Dataset, wanted: range, with_signal: int) -> None:
+def test_a_stopped_search_continues(runs: Runs, undisturbed: xr.Dataset, wanted: range, with_signal: int) -> None:
     """Stopped within round after round, also between two saved states of the same one."""
     checkpoint = runs.out / "standard_critical.checkpoint"
     stops = 0

@@ -75,7 +75,7 @@ def spin(kernel: Kernel, table: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def threads(number: int) -> Iterator[None]:
-    """Run kernels on so many threads, or on all there are."""
+    """Run kernels on this number of threads, or on all there are."""
     before = numba.get_num_threads()
     numba.set_num_threads(min(number, numba.config.NUMBA_NUM_THREADS))
     try:

@@ -77,7 +77,7 @@ def run_cells(bodies: Iterable[Mapping[str, float]], output: Path | None = None,
 
 
 def in_sittings(chunks: int, config: Any, output: Path) -> tuple[xr.Dataset, int, Stop]:
-    """A run that is interrupted after so many chunks and resumed, until it ends: how often, and what was said last.
+    """A run that is interrupted after `chunks` chunks and resumed, until it ends: how often, and what was said last.
 
     The last sitting has nothing to say if the one before was interrupted after the last chunk.
     """

@@ -24,7 +24,7 @@ from sweep.models.slow.exchange import HIGHER, LOWEST, TERMS
 # With 16 lanes a step takes a fifth longer; with 64, more lanes are idle at the end.
 _LANES = 1 if INTERPRETED else 32
 
-# Steps between two looks at which lanes have ended.
+# Steps between two checks which lanes have ended.
 _BLOCK = 8
 
 # A step turns the spin by no more than this share of what a mode can.  The rates, whose derivative by the spin is about
@@ -63,7 +63,7 @@ Lane = namedtuple(
     "d size strong bent_rates bent_turn far_apart rest",
 )
 """What a lane holds of a trajectory: the amplitudes z of two modes, and these modes V; the spin n, and x, the spin at
-which the coefficients are evaluated; the spin without the beat at the last look, and the number of reversals; 1 unless
+which the coefficients are evaluated; the spin without the beat at the last check, and the number of reversals; 1 unless
 each mode keeps its own amplitude; the length of the step, the number of steps, and the state; for a step, the means of
 |a_1|², |a_2|² and a_1 a_2* (e1, e2, beat); for each mode, by how much its logarithm has changed since it last turned
 the spin, and the least of that; whether the mode that turned the spin last had fallen too far; the spin that would
@@ -271,7 +271,7 @@ def _lasts(n, r1, r2, d, left1, left2):
 
 @inline
 def _tracked(at, acts, reverses):
-    """Return log1, log2, low1, low2 and sunk after a look."""
+    """Return log1, log2, low1, low2 and sunk after a check."""
     strong = abs(acts.h1) * acts.f1 >= abs(acts.h2) * acts.f2
     first, second = reverses & strong, reverses & (not strong)
     deep = 1.0 if (at.low1 if first else at.low2) < _DEEPEST else 0.0
@@ -282,7 +282,7 @@ def _tracked(at, acts, reverses):
 
 @inline
 def _course(at, now, acts, spin, far, reverses):
-    """Return the state, the spin that would remain, and overshoot and nearest approach after a look at a spin.
+    """Return the state, the spin that would remain, and overshoot and nearest approach after a check at a spin.
 
     With a couple, which slows all spins, the nearest approach is the smallest share that |spin| has in the sum of
     |spin| and of what both modes can still do to it.
@@ -346,7 +346,7 @@ def _make_coefficients(wide):
 
 
 def _make_begin(wide):
-    """Compiled (g, s, pace) -> None: looks at all lanes, chooses a step, and finds the spin in its middle."""
+    """Compiled (g, s, pace) -> None: checks all lanes, chooses a step, and finds the spin in its middle."""
     store_look = _storing("old", "count", "log1", "log2", "low1", "low2", "sunk", "state", "end", "overshoot",
                           "nearest")  # fmt: skip
     store_step = _storing("step", "keep", "e1", "e2", "beat", "x", *_COMPLEX[:6])

@@ -37,7 +37,7 @@ def load(origin: Origin) -> Model | SlipWith:
         trial.check(made, origin)
     if isinstance(made, SlipWith):
         return replace(made, origin=origin)
-    # The states of an image share a table with other quantities, so their names could clash.
+    # In a state row, states stand next to other quantities, so their names could clash.
     states = tuple(f"state.{name}" for name in made.states)
     parameters = (*(p.name for p in made.own_parameters), *made.parameters)
     return replace(made, origin=origin, states=states, parameters=parameters)
