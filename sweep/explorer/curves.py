@@ -23,6 +23,13 @@ _STRETCHES = 3000
 
 _OVER_TIME = ("spin", "energy", "dissipated")
 
+_SPIN, _ENTRY = 240, 20
+"""Heights in pixels: of the spin's figure without its legend, and of one entry of the legend."""
+
+
+_ABOVE: dict[str, Any] = {"location": "left", "padding": 0, "margin": 2}
+"""The place of a legend above its figure, where it covers no curve."""
+
 
 class Curves:
     """The figures of the trajectories, with `MAX_CELLS` curves each."""
@@ -32,19 +39,22 @@ class Curves:
         self._hint = models.Div(text=hint, sizing_mode="stretch_width")
         self.root = models.Column(self._hint, sizing_mode="stretch_width", name="curves")
         """The hint, or the figures once they have curves: Bokeh warns of a figure without data."""
-        self.spin, self.energy = _figure(260, "spin"), _figure(190, "energies")
+        self.spin, self.energy = _figure(_SPIN + _ENTRY, "spin"), _figure(190 + _ENTRY, "energies")
         self.energy.x_range = self.spin.x_range
         self._slots = [_Slot(self, colour) for colour in CURVES[:MAX_CELLS]]
         items = [slot.item for slot in self._slots]
-        self.spin.add_layout(models.Legend(items=items, location="top_right", name="curve legend"))
+        self.spin.add_layout(models.Legend(items=items, name="curve legend", **_ABOVE), "above")
         self.spin.y_range.renderers = [item.renderers[0] for item in items]  # critical spins may be far away
-        for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed")):
-            self.energy.line([np.nan], [np.nan], color=SOFT, line_dash=dash, legend_label=words)
-        self.energy.legend.location = "right"
-        self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": []})
+        dashes = [
+            (words, [self.energy.line([np.nan], [np.nan], color=SOFT, line_dash=dash)])
+            for words, dash in (("energy above rest", "solid"), ("work against friction", "dashed"))
+        ]
+        self.energy.add_layout(models.Legend(items=dashes, orientation="horizontal", spacing=16, **_ABOVE), "above")
+        self._critical = models.ColumnDataSource({"spin": [], "time": [], "dash": [], "symbol": [], "side": []})
         self.spin.hspan("spin", source=self._critical, line_color=SOFT, line_dash="dash", level="underlay")
         self.spin.text("time", "spin", "symbol", source=self._critical, text_font_size="11px", text_align="right",
-                       text_color="#4a5560", name="symbols")  # fmt: skip
+                       text_baseline="side", text_color="#4a5560", background_fill_color="white",
+                       background_fill_alpha=0.8, level="annotation", name="symbols")  # fmt: skip
         self._played: tuple[Curve | None, float] | None = None
         self.player = Player([self.spin, self.energy])
 
@@ -53,6 +63,7 @@ class Curves:
         for k, slot in enumerate(self._slots):
             slot.show(curves[k] if k < len(curves) else None, names[k] if k < len(curves) else "")
         present = [curve.dataset for curve in curves if curve]
+        self.spin.height = _SPIN + _ENTRY * max(1, len(present))
         if present:
             self._label(present[0])
         parts = {"spin": self.spin, "energy": self.energy}
@@ -70,6 +81,7 @@ class Curves:
                 "time": [end * {"n_c1⁺": 0.87, "n_c1⁻": 0.74}.get(sign, 1.0) for _, sign, *_ in spins],
                 "dash": [theory.OVER_TIME[name] for name, *_ in spins],
                 "symbol": [sign for _, sign, *_ in spins],
+                "side": ["bottom" if at > 0 else "top" for _, _, at, _ in spins],  # away from the dots on the zero line
             }
 
     def _label(self, one: xr.Dataset) -> None:

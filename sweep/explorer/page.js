@@ -264,12 +264,13 @@ const sweep = (() => {
 
   /** Give letters that no style sheet reaches a colour that can be read. */
   function ink() {
-    const colour = document.documentElement.dataset.theme === "dark" ? "#b8c2cb" : "#4a5560"
+    const [colour, paper] = document.documentElement.dataset.theme === "dark" ? ["#b8c2cb", "#1c242b"] : ["#4a5560", "#fff"]
     for (const model of window.Bokeh?.documents[0]?.all_models ?? []) {
       const names = {ColorBar: ["major_label_text_color", "title_text_color"], Legend: ["label_text_color"]}[model.type]
       const glyph = model.name === "symbols" ? model.glyph : null
       for (const each of names ?? []) if (model[each] !== colour) model.setv({[each]: colour}, {sync: false})
-      if (glyph && glyph.text_color.value !== colour) glyph.setv({text_color: {value: colour}}, {sync: false})
+      const drawn = {text_color: {value: colour}, background_fill_color: {value: paper}}
+      if (glyph && glyph.text_color.value !== colour) glyph.setv(drawn, {sync: false})
     }
   }
 

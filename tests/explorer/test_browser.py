@@ -743,6 +743,8 @@ def test_nothing_runs_out_of_the_window(clicked: Page) -> None:
         clicked.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
         for name in ("map figure", "spin", "energies", "body"):
             wait(clicked, name, f"200 < m.outer_width && m.outer_width <= {width}")
+        view = f"Bokeh.index.find_one({found('spin')})"
+        wait(clicked, "curve legend", f"{view}.frame.bbox.top >= Bokeh.index.find_one(m).bbox.bottom")  # on no curve
 
 
 def test_a_click_runs_a_users_model_that_the_user_names(go: Open, tmp_path: Path) -> None:
