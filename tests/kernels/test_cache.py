@@ -87,7 +87,7 @@ CHECK, MAKE = "        def check(group, lane, seen):\n", "    def make_check(sel
     [
         (CHECK, f"{CHECK}            gruop[0] = 1.0\n", 1, "does not compile: .*gruop"),
         (CHECK, f"{CHECK}            group[lane] = np.nosuch(seen.spin)\n", 1, "does not compile: .*nosuch"),
-        (CHECK, CHECK.replace("seen", "sen"), 2, "does not compile: .*seen"),
+        (CHECK, CHECK.replace("seen", "sen"), 9, "does not compile: NameError: name 'seen'"),
         (CHECK, CHECK.replace(", seen", ""), -1, r"does not compile: check\(group, lane\) is called with .*, seen\):"),
         (MAKE, f'{MAKE}        layout.at("dnoe")\n', 1, r"does not compile: no quantity 'dnoe' .*did you mean done\?"),
         (MAKE, MAKE.replace(", layout: Layout", ""), 0, r"Margin.make_check\(\) takes 1 positional argument but 2"),
