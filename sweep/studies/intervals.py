@@ -12,16 +12,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import compress
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from sweep.grid import Array
 from sweep.studies.concurrent import run_concurrently
 from sweep.studies.misfit import Ask, Minimum, Note, Problem, minimise
 
 LEVELS = {68: 1.0, 95: 3.84}
-"""Percentages of the intervals, and rise of the misfit at their ends: quantiles of chi square for one parameter."""
+"""Percentages of the intervals, and rise of the misfit at their ends: quantiles of chi square for one parameter, hence
+for errors that are known."""
 
 # A direction is undetermined if its 95 % interval is longer than this share of the ranges.
 _BLIND = 0.5
@@ -49,7 +52,17 @@ def variance(problem: Problem, best: Minimum) -> float:
     """Return the variance of the residuals: 1 if the film gives its errors."""
     if problem.film.error is not None:
         return 1.0
-    return best.misfit / (problem.rows - len(problem.free))
+    return best.misfit / problem.freedom
+
+
+def _rises(problem: Problem) -> list[float]:
+    """Return the rise of the misfit at the ends of the intervals of `LEVELS`, in units of the variance.
+
+    If the variance follows from the residuals, it is a quantile of Student's t, squared.
+    """
+    if problem.film.error is not None:
+        return [*LEVELS.values()]
+    return stats.f.isf(stats.chi2.sf([*LEVELS.values()], 1), 1, problem.freedom).tolist()
 
 
 class _Side(NamedTuple):
@@ -99,14 +112,14 @@ def _profiles(
     lowest = min((side.lower for side in found if side.lower), key=lambda each: each.misfit, default=None)
     if lowest and stops:
         return np.empty(0), lowest
-    deviations = np.sqrt(np.outer([*LEVELS.values()], np.diag(covariance(problem, best))))
+    deviations, rises = np.sqrt(np.outer([*LEVELS.values()], np.diag(covariance(problem, best)))), _rises(problem)
     low, high = np.clip([best.place - deviations, best.place + deviations], 0, 1)
     low[:, parameters], high[:, parameters] = np.reshape(
         [side.ends for side in found], (2, len(parameters), len(LEVELS))
     ).transpose(0, 2, 1)
     known += [(_on_side(problem, place, best), rise) for side in found for place, rise in side.valley]
     places, above = np.stack([place for place, _ in known]), np.array([rise for _, rise in known])
-    for level, allowed in enumerate(LEVELS.values()):
+    for level, allowed in enumerate(rises):
         within = places[above <= allowed]
         low[level] = np.minimum(low[level], within.min(axis=0))
         high[level] = np.maximum(high[level], within.max(axis=0))
@@ -133,7 +146,7 @@ def _scanned(problem: Problem, best: Minimum) -> list[Minimum]:
         low = [each.misfit < best.misfit + _HIGH * unit for each in found]
         found = [*compress(found, low)]
         searches = [(i, each.place) for (i, _), each in zip(compress(searches, low), found, strict=True)]
-    beyond = [each.place for each in found if each.misfit > best.misfit + LEVELS[95] * unit]
+    beyond = [each.place for each in found if each.misfit > best.misfit + _rises(problem)[-1] * unit]
     return found + _minimised(problem, [partial(minimise, place=at, enough=_ACCURACIES[-1]) for at in beyond])
 
 
@@ -146,9 +159,9 @@ def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, fl
     spread, unit = covariance(problem, best), variance(problem, best)
     size = np.sqrt(max(spread[i, i], 1e-30))
     along, reach, ends = spread[:, i] / size**2, float(size), list[float]()
-    side = _Side(ends, [], None)
-    for allowed in LEVELS.values():
-        reach *= float(np.sqrt(allowed / LEVELS[68]))
+    side, before = _Side(ends, [], None), 1.0
+    for allowed in _rises(problem):
+        reach, before = reach * sqrt(allowed / before), allowed
         near = max(sign * (place[i] - best.place[i]) for place, rise in known + side.valley if rise <= allowed)
         reach, far = max(reach, float(near + size / 2)), np.inf
         for _ in range(8):
@@ -161,12 +174,15 @@ def _side(ask: Ask, problem: Problem, best: Minimum, known: list[tuple[Array, fl
             side.valley.append((found.place, above))
             if above < -_LOWER * allowed:
                 side = side._replace(lower=found)
-            if side.lower or abs(above / allowed - 1) < 0.05 or (end in (0, 1) and above < allowed):
+            if side.lower or (end in (0, 1) and above < allowed):
                 break
             reach = abs(end - best.place[i])
-            near, far = (reach, far) if above < allowed else (near, reach)
             # A profile is nearly a parabola; where it is not, halve the interval.
-            guess = reach * float(np.sqrt(allowed / max(above, 0.05 * allowed)))
+            guess = reach * sqrt(allowed / max(above, 0.05 * allowed))
+            if abs(above / allowed - 1) < 0.05:
+                reach = guess
+                break
+            near, far = (reach, far) if above < allowed else (near, reach)
             reach = guess if near < guess < far else (near + far) / 2
         ends.append(float(np.clip(best.place[i] + sign * reach, 0, 1)))
         if side.lower:

@@ -90,6 +90,11 @@ class Problem:
         return int(self.kept.sum()) + len(self.measured)
 
     @property
+    def freedom(self) -> int:
+        """Number of these less that of what is found, such as the direction from which a heading is counted."""
+        return self.rows - len(self.free) - (self.film.what == "heading")
+
+    @property
     def measured(self) -> list[int]:
         """Indices of the parameters that were measured independently."""
         return [i for i, each in enumerate(self.free.values()) if each.prior]

@@ -70,7 +70,7 @@ def posed(config: Config, film: Film, free: Sequence[str]) -> Problem:
                                    else ranges.of_parameter(config, film, name))
         for name in dict.fromkeys([*free, *known])
     }  # fmt: skip
-    if len(sought) >= len(film.time):
+    if len(sought) + (film.what == "heading") >= len(film.time):
         raise fault_of(f"{len(sought)} parameters, and the film has {len(film.time)} rows; free fewer", "free")
     ends = {n: Values((r.low, r.high), True, [r.low, r.high]) for n, r in sought.items() if n in (*BODY, "x0", "y0")}
     if off := misplaced(replace(config, parameters=config.parameters | ends)):

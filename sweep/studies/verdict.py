@@ -87,7 +87,7 @@ def judged(problem: Problem, best: Minimum) -> Verdict:
         reasons.append(f"curve and film differ by {by}, and in the same direction for many rows")
     if size > 0 and stats.kurtosis(away) > _TAILS * sqrt(24 / len(away)):
         reasons.append("some rows lie farther from the curve than noise can explain")
-    if problem.film.error is not None and stats.chi2.sf(best.misfit, problem.rows - len(problem.free)) < _CHANCE:
+    if problem.film.error is not None and stats.chi2.sf(best.misfit, problem.freedom) < _CHANCE:
         reasons.append(f"curve and film differ by {size:.3g} times the errors given in the film")
     if (left_out := int((~kept).sum())) > _SHARE * len(kept):
         reasons.append(f"{left_out} of {len(kept)} rows are outliers")

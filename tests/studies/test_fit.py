@@ -15,6 +15,7 @@ from unittest.mock import Mock, patch
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 from scipy.integrate import solve_ivp
 from support import ROOT, Write, adaptive, columns, films, newton
 from support.cli import invoke
@@ -219,6 +220,24 @@ def test_intervals_hold_as_many_truths_as_they_say() -> None:
     shares = np.mean(held, axis=0)
     np.testing.assert_allclose(shares, [[0.683] * 2, [0.95] * 2], atol=0.07)
     np.testing.assert_allclose(shares[1], 0.95, atol=0.04)
+
+
+@pytest.mark.parametrize("what", ["spin", "heading"])
+def test_intervals_of_a_short_film_are_those_of_a_regression(what: Seen) -> None:
+    """Of a line through eight rows, by Student's t: where a heading is counted from is not seen, but found as well."""
+    times = np.linspace(0, 20, 8)
+    value = 0.03 * times + np.random.default_rng(2).normal(0, 0.1, 8)
+    if what == "heading":
+        problem = toy(lambda places, t: places[:, :1] * (t - t.mean()), value - value.mean(), None)
+        problem.film, problem.free = replace(problem.film, what="heading"), {"n0": problem.free["n0"]}
+    else:
+        problem = toy(lambda places, t: places[:, :1] * t + places[:, 1:] - 0.5, value, None)
+    best, limits, _ = intervals(problem, found_near(problem, [0.5] * len(problem.free)), lambda _: None)
+    line = stats.linregress(times, value)
+    assert best.place[0] == pytest.approx(line.slope)
+    for (low, high), share in zip(limits[..., 0], (0.6827, 0.95), strict=True):
+        half = line.stderr * stats.t.isf((1 - share) / 2, 6)
+        assert [low, high] == pytest.approx([line.slope - half, line.slope + half], abs=0.003 * half)
 
 
 def test_an_interval_holds_other_minima_that_fit_as_well() -> None:
