@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from heapq import heappop, heappush
 from math import degrees, prod, radians, sqrt
 
 import numpy as np
@@ -74,26 +75,35 @@ def advised(
     def criterion(problem: Problem, size: float) -> float:
         return 2 * (len(film.time) * float(np.log(max(size, 1e-300))) + len(problem.unknown))
 
-    tried: list[tuple[bool, float, float, str]] = []
+    tried: list[tuple[bool, int, int, float, float, str]] = []
     for changes in (_changes(config, posed, free, compared=compared), _cuts(posed)):
-        for change in changes:
-            if not judged.doubtful and change.kind not in _ALWAYS:
+        trials = [
+            (change, search.searched(change.problem, _POINTS, _KEPT, silent))
+            for change in changes
+            if judged.doubtful or change.kind in _ALWAYS
+        ]
+        kinds += dict.fromkeys(change.kind for change, _ in trials)
+        queue = [(0.0, k) for k in range(len(trials))]
+        while queue:  # the change that fits best so far goes on first: the right one, and most of the others need not
+            _, k = heappop(queue)
+            change, parts = trials[k]
+            instants, minima = next(parts)
+            least = min([before, *(each[4] for each in tried)]) * change.scale / np.median(film.errors)
+            if minima[0].misfit > (_ROOM * least) ** 2 * change.problem.rows:
                 continue
-            kinds += [change.kind] * (change.kind not in kinds)
-            least = min([before, *(each[2] for each in tried)]) * change.scale / np.median(film.errors)
-            most = (_ROOM * least) ** 2 * change.problem.rows
-            minima = search.search(change.problem, _POINTS, _KEPT, 0, silent, most)
-            if minima[0].misfit > most:
+            if instants < len(change.problem.film.time):
+                heappush(queue, (minima[0].misfit / change.scale**2 / instants, k))
                 continue
             calm, minima = search.settled(change.problem, minima, silent)
             fits, size = verdict.judged(calm, minima[0]).fits, _size(calm, minima[0]) / change.scale
             note(f"{change.words}: misfit {size:.3g}, where it was {before:.3g}")
             words = change.words + _value(change.shows, calm, minima[0])
-            tried.append((not fits, criterion(calm, size), size, words))
+            likely = criterion(calm, size)  # rounded: of changes that are equally likely, the first is named
+            tried.append((not fits, round(likely), k, likely, size, words))
         if judged.fits or not all(each[0] for each in tried):  # a cut leaves too few rows to compare their noise
             break
     usual = criterion(problem, before)
-    off, least, size, words = min(tried, default=(True, usual, before, ""))
+    off, _, _, least, size, words = min(tried, default=(True, 0, 0, usual, before, ""))
     unit = pretty(named(ANGLE if film.what == "heading" else SPIN, config.units))
     fall = f"which reduces the misfit from {before:.2g} to {size:.2g} {unit}"
     if size > _LESS * before and off:
@@ -129,7 +139,8 @@ def _changes(config: Config, posed: Problem, free: Sequence[str], *, compared: b
             yield _ranged(name, f"let {name} be free", posed, name, each)
     for name, each in posed.free.items():
         if each.given:
-            yield _ranged(f"the range of {name}", f"widen the range of {name}", posed, name, replace(each, given=False))
+            wider = replace(each, given=False).widened(up=True).widened(up=False)
+            yield _ranged(f"the range of {name}", f"widen the range of {name}", posed, name, wider)
     if config.model == "slip" and not (compared or config.origin):
         for law in [LAWS[name] for name in _LAWS if name != config.law]:
             other_law, own = with_law(config, law)

@@ -48,7 +48,7 @@ def fit(config: Config, film: Film, free: Sequence[str], note: Note, *, compared
     with blamed(config.origin):
         search.check_length(posed)
         problem, minima = search.found(posed, note)
-        found, limits, rugged = intervals(problem, minima, note)
+        found, limits, rugged = intervals(problem, minima, note, lambda best: verdict.judged(problem, best).fits)
         (best,) = search.turned(problem, [found])
         if best is not found:
             at = problem.mirrored

@@ -76,16 +76,19 @@ class _Side(NamedTuple):
     """A minimum that is lower than the best, if one is met."""
 
 
-def intervals(problem: Problem, minima: Sequence[Minimum], note: Note) -> tuple[Minimum, Array, bool]:
+def intervals(
+    problem: Problem, minima: Sequence[Minimum], note: Note, believed: Callable[[Minimum], bool] = lambda _: True
+) -> tuple[Minimum, Array, bool]:
     """Return the best minimum, and the ends of the intervals of `LEVELS` as places, shape (levels, 2, free).
 
     `minima` are those of the search, the lowest first.  An end at 0 or 1 is an end of the range.  If a profile meets a
     lower minimum, the computation starts again from there.  If that happens more than once, the misfit is rugged, which
-    is reported too.
+    is reported too.  The intervals of a minimum that is not `believed` are those of the linear theory, after a rough
+    scan for a lower one.
     """
     best = minima[0]
     for restart in range(_RESTARTS + 1):
-        limits, lower = _profiles(problem, best, minima, note, stops=restart < _RESTARTS)
+        limits, lower = _profiles(problem, best, minima, note, stops=restart < _RESTARTS, rough=not believed(best))
         if lower is None:
             break
         (best,) = run_concurrently([partial(minimise, place=lower.place)], problem.answers)
@@ -94,14 +97,18 @@ def intervals(problem: Problem, minima: Sequence[Minimum], note: Note) -> tuple[
 
 
 def _profiles(
-    problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Note, *, stops: bool
+    problem: Problem, best: Minimum, minima: Sequence[Minimum], note: Note, *, stops: bool, rough: bool
 ) -> tuple[Array, Minimum | None]:
     """Return the ends of all intervals, shape (levels, 2, free), or, with `stops`, a lower minimum if one is met."""
     unit, parameters = variance(problem, best), problem.unknown
-    valleys = [*minima, *_scanned(problem, best)]
+    valleys = [*minima, *_scanned(problem, best, rough=rough)]
     lower = min(valleys, key=lambda each: each.misfit)
     if stops and lower.misfit < best.misfit - _LOWER * unit:
         return np.empty(0), lower
+    deviations, rises = np.sqrt(np.outer([*LEVELS.values()], np.diag(covariance(problem, best)))), _rises(problem)
+    low, high = np.clip([best.place - deviations, best.place + deviations], 0, 1)
+    if rough:
+        return np.stack([low, high], axis=1), None
     known = [(best.place, 0.0), *((each.place, (each.misfit - best.misfit) / unit) for each in valleys)]
     known = [(_on_side(problem, place, best), rise) for place, rise in known]
     sides = [
@@ -112,8 +119,6 @@ def _profiles(
     lowest = min((side.lower for side in found if side.lower), key=lambda each: each.misfit, default=None)
     if lowest and stops:
         return np.empty(0), lowest
-    deviations, rises = np.sqrt(np.outer([*LEVELS.values()], np.diag(covariance(problem, best)))), _rises(problem)
-    low, high = np.clip([best.place - deviations, best.place + deviations], 0, 1)
     low[:, parameters], high[:, parameters] = np.reshape(
         [side.ends for side in found], (2, len(parameters), len(LEVELS))
     ).transpose(0, 2, 1)
@@ -134,7 +139,7 @@ def _on_side(problem: Problem, place: Array, best: Minimum) -> Array:
     return place
 
 
-def _scanned(problem: Problem, best: Minimum) -> list[Minimum]:
+def _scanned(problem: Problem, best: Minimum, *, rough: bool) -> list[Minimum]:
     """Return minima, most of them with one parameter fixed, in valleys that walls of the misfit hide from a profile."""
     deviation, searches = np.sqrt(np.diag(covariance(problem, best))), list[tuple[int, Array]]()
     for i in problem.unknown:
@@ -146,6 +151,8 @@ def _scanned(problem: Problem, best: Minimum) -> list[Minimum]:
         low = [each.misfit < best.misfit + _HIGH * unit for each in found]
         found = [*compress(found, low)]
         searches = [(i, each.place) for (i, _), each in zip(compress(searches, low), found, strict=True)]
+        if rough:
+            return found
     beyond = [each.place for each in found if each.misfit > best.misfit + _rises(problem)[-1] * unit]
     return found + _minimised(problem, [partial(minimise, place=at, enough=_ACCURACIES[-1]) for at in beyond])
 

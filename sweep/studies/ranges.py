@@ -109,8 +109,9 @@ def of_parameter(config: Config, film: Film, name: str) -> Range:
     if name == "sigma":
         return Range(0.0, high := _drag(config, film), high * _FROM_ZERO, least=0.0)
     if usual := wide(config, config.own_law or LAWS[config.law]).get(name):
-        low, high = usual
-        return Range.even(min(low, value / 5 or low), max(high, value * 5), least=least)
+        low, high = min(usual[0], value / 5 or inf), max(usual[1], value * 5)
+        # Not widened to where the law is stiffer: a body hardly slips there, and takes ten times as many steps.
+        return Range.even(low, high, low) if "speed" in name else Range.even(low, high, least, high)
     return _around(config, parameter, value, least, most)
 
 

@@ -8,7 +8,7 @@ up for a wrong start, vary only over the whole film.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from math import ceil, sqrt
@@ -28,8 +28,9 @@ from sweep.studies.intervals import variance
 from sweep.studies.misfit import ENOUGH, Minimum, Note, Problem, minimise
 from sweep.studies.study import require_simulated
 
-SEARCHES = ((256, 6), (1024, 8))
-"""Numbers of points all over the ranges and of best points to continue from; more if the first search finds no fit."""
+SEARCHES = ((256, 6, False), (1024, 8, True))
+"""Numbers of points all over the ranges and of best points to continue from, and whether measured parameters are held;
+the second if the first search finds no fit."""
 
 # Minima whose parameters differ by less than this share of their ranges are merged.
 _SAME = 0.01
@@ -39,12 +40,12 @@ _SAME = 0.01
 # 1.3 was no better than 1.5.
 _LONGER, _HORIZONS = 1.5, 7
 
-# Accuracy of minima over a part of the film.
-_ROUGHLY = 1e-5
+# Accuracy of minima until a fit is believed.
+_ROUGHLY = 1e-4
 
 # Number of times outliers are sought and ranges widened: where the misfit would fall by half a variance within another
-# tenth of the range.
-_ROUNDS, _WIDENED = 4, (0.1, 0.5)
+# tenth of the range. The weight of measured parameters need be no more accurate than `_STEADY`.
+_ROUNDS, _WIDENED, _STEADY = 4, (0.1, 0.5), 0.01
 
 _MOST_STEPS = 1e6
 """Largest median number of steps per trajectory. Random films take 3,000 to 30,000, and a million or more if degrees
@@ -125,13 +126,16 @@ def check_length(problem: Problem) -> None:
 def found(problem: Problem, note: Note) -> tuple[Problem, list[Minimum]]:
     """Return the minima over the whole film, lowest first, and the problem with the final ranges and outliers."""
     tried: list[tuple[Problem, list[Minimum]]] = []
-    for seed, (points, kept) in enumerate(SEARCHES):
-        calm, minima = settled(problem, search(problem, points, kept, seed, note), note)
+    for points, kept, hold in SEARCHES:
+        *_, (_, minima) = searched(problem, points, kept, note, hold=hold)
+        calm, minima = settled(problem, minima, note)
         tried.append((calm, minima))
         # A wider range may have led into a corner far from the minimum.
         if calm.free == problem.free and verdict.judged(calm, minima[0]).fits:
             break
     problem, minima = min(tried, key=lambda each: each[1][0].misfit)
+    if verdict.judged(problem, minima[0]).fits:
+        minima = _minimised(problem, [each.place for each in minima], enough=ENOUGH)
     return problem, _different(turned(problem, minima))
 
 
@@ -152,27 +156,29 @@ def turned(problem: Problem, minima: list[Minimum]) -> list[Minimum]:
     return found
 
 
-def search(problem: Problem, points: int, kept: int, seed: int, note: Note, most: float = np.inf) -> list[Minimum]:
-    """Return minima over the whole film, lowest first; over its beginning if their misfit exceeds `most` there."""
-    sobol, rows = qmc.Sobol(len(problem.free), rng=seed).random(points), len(problem.film.time)
-    known = problem.measured if seed else []
+def searched(
+    problem: Problem, points: int, kept: int, note: Note, *, hold: bool = False
+) -> Iterator[tuple[int, list[Minimum]]]:
+    """Yield minima over more and more instants, and their number: over the whole film last.
+
+    With `hold`, measured parameters vary only over the whole film.
+    """
+    sobol, rows = qmc.Sobol(len(problem.free), rng=int(hold)).random(points), len(problem.film.time)
+    known = problem.measured if hold else []
     centre = np.array([each.place(each.prior[0]) if each.prior else 0.5 for each in problem.free.values()])
     sobol[:, known] = centre[known]
     horizons = [ceil(rows / _LONGER**k) for k in range(_HORIZONS - 1, -1, -1)]
     cost = np.sum(problem.residuals(sobol, horizons[0]) ** 2, axis=1)
     places = [centre, *sobol[np.argsort(cost)[:kept]]]
     for number, instants in enumerate(horizons, start=1):
-        accuracy, held = (ENOUGH, ()) if instants == rows else (_ROUGHLY, known)
-        minima = _minimised(problem, places, instants, accuracy, held)
+        minima = _minimised(problem, places, instants, fixed=known if instants < rows else ())
         note(f"film up to {problem.film.time[instants - 1]:.4g}, {number} of {len(horizons)}: minima: {len(minima)}")
         places = [each.place for each in minima]
-        if minima[0].misfit > most:
-            break
-    return minima
+        yield instants, minima
 
 
 def _minimised(
-    problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = ENOUGH,
+    problem: Problem, places: Sequence[Array], instants: int | None = None, enough: float = _ROUGHLY,
     fixed: Sequence[int] = (),
 ) -> list[Minimum]:  # fmt: skip
     """Return the minima near these places, lowest first, over the film or its first instants."""
@@ -189,7 +195,8 @@ def settled(problem: Problem, minima: list[Minimum], note: Note) -> tuple[Proble
         sides = verdict.pressed(problem, best, *_WIDENED)
         free = {name: r.widened(up=sides[name] > 0) if name in sides else r for name, r in problem.free.items()}
         scale = np.sqrt(variance(problem, best))
-        if free == problem.free and (kept == problem.kept).all() and (scale == problem.scale or not problem.measured):
+        steady = not problem.measured or abs(scale / problem.scale - 1) < _STEADY
+        if free == problem.free and (kept == problem.kept).all() and steady:
             break
         if (off := int((~kept).sum())) and (kept != problem.kept).any():
             note(f"{counted(off, 'outlier')} left out")

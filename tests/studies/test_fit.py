@@ -252,6 +252,15 @@ def test_an_interval_holds_other_minima_that_fit_as_well() -> None:
         assert low[1] < 0.15 < 0.34 < high[1]
 
 
+def test_the_intervals_of_a_curve_that_is_not_believed_are_linear() -> None:
+    """About the lower of two minima, which a rough scan finds."""
+    problem = toy(lambda places, t: twofold(places, t) * [1, 20, 1], np.zeros(3), 1.0)
+    best, limits, _ = intervals(problem, found_near(problem, [0.7, 0.35]), lambda _: None, lambda _: False)
+    assert best.place == pytest.approx([0.3, 0.15], abs=1e-3)
+    spread = np.diag(np.linalg.inv(best.jacobian.T @ best.jacobian))
+    np.testing.assert_allclose(limits[1, 1] - limits[1, 0], 2 * np.sqrt(3.84 * spread))
+
+
 def test_a_right_curve_of_many_parameters_in_a_short_film_is_hardly_ever_refused() -> None:
     """One in 500 by construction; chi square for Ljung and Box's sum would refuse 2 %."""
     times, random = np.linspace(-1, 1, 83), np.random.default_rng(5)
