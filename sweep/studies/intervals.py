@@ -62,7 +62,7 @@ def _rises(problem: Problem) -> list[float]:
     """
     if problem.film.error is not None:
         return [*LEVELS.values()]
-    return stats.f.isf(stats.chi2.sf([*LEVELS.values()], 1), 1, problem.freedom).tolist()
+    return [float(each) for each in stats.f.isf(stats.chi2.sf([*LEVELS.values()], 1), 1, problem.freedom)]
 
 
 class _Side(NamedTuple):
