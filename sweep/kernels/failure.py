@@ -14,9 +14,8 @@ import numpy as np
 
 from sweep.jit import Cached, compiled, parallel
 from sweep.kernels.codegen import make_gather
-from sweep.kernels.runge_kutta import make_step
+from sweep.kernels.runge_kutta import DOPRI5, make_step
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, RUNNING, TOPPLED
-from sweep.kernels.tableau import DOPRI5
 from sweep.models.generated import compile_inline
 from sweep.models.model import Array, Model, stack
 
@@ -85,7 +84,7 @@ def _make_follow(model: Model):
     terms = [f"abs(one[{i}] - two[{i}]) / max(abs(two[{i}]), {_SMALL!r})" for i in range(n)]
     difference = compile_inline("difference", "one, two", [f"return max({', '.join(terms)})"], {})
     # The difference of one step from two of half the length exceeds the error of the latter by this factor.
-    allowed = _TOLERANCE * (2**DOPRI5.order - 1)
+    allowed = _TOLERANCE * (2**DOPRI5.error_order - 1)
 
     @compiled
     def kind(y, p, infinite):

@@ -1,6 +1,6 @@
 """Define what an integration method is, and explain how to add one.
 
-An explicit Runge-Kutta method is a record in `sweep.kernels.tableau`.  Any other is a subclass of
+An explicit Runge-Kutta method is a record in `sweep.kernels.runge_kutta`.  Any other is a subclass of
 `sweep.kernels.kernel.Stepper`, in a file of its own, like `runge_kutta`; enter an instance in `METHODS` of
 `sweep.kernels.methods`.  The configuration, the choice of the cheapest method, the provenance and the benchmark then
 include it.  Times and steps are in sqrt(c/g), spins in sqrt(g/c).

@@ -6,15 +6,15 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sweep.kernels import measures, runge_kutta
+from sweep.kernels import measures
 from sweep.kernels.adams import kernel as adams
 from sweep.kernels.kernel import Kernel, Stepper
 from sweep.kernels.method import ACCURACY, STABILITY, TOLERANCE, Tolerance
-from sweep.kernels.tableau import TABLEAUS
+from sweep.kernels.runge_kutta import TABLEAUS
 from sweep.models.model import Array, Columns, Model
 from sweep.models.theory.linear import fastest_motion
 
-METHODS: dict[str, Stepper] = {method.name: method for method in (*map(runge_kutta.method, TABLEAUS), adams.METHOD)}
+METHODS: dict[str, Stepper] = {method.name: method for method in (*TABLEAUS, adams.METHOD)}
 """The first is the plain method, which runs every model."""
 
 PLAIN = next(iter(METHODS))

@@ -14,9 +14,8 @@ import numpy as np
 from sweep.jit import Cached, exactly_compiled, full_width, parallel
 from sweep.kernels.codegen import make_access
 from sweep.kernels.layout import LANES, Layout, constants_of
-from sweep.kernels.runge_kutta import make_step
+from sweep.kernels.runge_kutta import DOPRI5, make_step
 from sweep.kernels.samples import in_lanes
-from sweep.kernels.tableau import DOPRI5
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Model
 

@@ -3,11 +3,14 @@
 A loop over stages and states would need arrays, and arrays inside the loop over lanes prevent LLVM
 from vectorising across trajectories.  So the step is written out for each tableau and number of
 states, as plain assignments, which the compiler keeps in registers.
+
+To add a method, write its record and enter it in `TABLEAUS`; `tests/kernels/test_tableau.py` then checks it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction as F
 
 import numpy as np
 
@@ -17,28 +20,50 @@ from sweep.kernels.kernel import STABILITY_SHARE, Kernel, Stepper, steps_to
 from sweep.kernels.layout import BLOCK, PACK, Table
 from sweep.kernels.method import TOLERANCE, Tolerance
 from sweep.kernels.status import RUNNING
-from sweep.kernels.tableau import DOPRI5, LAYER_STEP, Tableau
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Array, Columns, Model
+
+LAYER_STEP = 3.0
+"""Step, in decay times of the slip, to which `RungeKutta.layer_error` is scaled."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RungeKutta(Stepper):
-    """The stepper of a tableau, for any model."""
+    """An explicit Runge-Kutta method for autonomous systems: its Butcher tableau, and how long its steps may be.
 
-    tableau: Tableau
+    `a[i]` holds the weights of the slopes 0 … i in the argument of slope i + 1, `b` those in the result, and `c` the
+    abscissae.  They are exact fractions, so that the tests find a mistyped entry.  `error_order` is the order of the
+    formula, `real_stability` the largest z with |R(-z)| <= 1, and `step_cost` the number of stages over six.
+    """
+
+    step_words: str = f"{STABILITY_SHARE:g} of the stability limit"
+    takes_every_step: bool = True
+    a: tuple[tuple[F, ...], ...]
+    b: tuple[F, ...]
+    c: tuple[F, ...]
+    phase: float
+    """Error constant: the phase of the fastest motion in a step at the default tolerance, in units of
+    `Model.radians_a_step`.  The error falls with the power `error_order` of it."""
+    layer_error: float
+    """Error constant of the start: the relative error of the slip while it goes from zero to the value that friction
+    holds, v' = λ (1 - v).  For short steps h it is |C| (h λ)^order / e, where the stability function is
+    R(-z) = exp(-z) + C z^(order + 1) + …; give that at h λ = `LAYER_STEP`, whether or not such a step is stable."""
+
+    @property
+    def stages(self) -> int:
+        return len(self.b)
 
     def accurate_step(self, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance) -> Array:
         """As of `Stepper`."""
-        tableau, power = self.tableau, 1 / self.tableau.order
-        step = tableau.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
+        power = 1 / self.error_order
+        step = self.phase * model.radians_a_step * (tolerance / TOLERANCE) ** power / motion
         if not decay.any():
             return np.asarray(step)
         # A slip that differs by v for a time 1/λ changes the rattle, of frequency ν, by the share (ν/λ)².
         spin, rattle, inertia = model.energy(model.start(columns), model.constants.of(columns))
         e = 2 * rattle / inertia
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            moved = tableau.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
+            moved = self.layer_error * e / np.sqrt(spin**2 + e) * (motion / decay) ** 2 / model.spin_unit(columns)
             return np.asarray(np.fmin(step, LAYER_STEP / decay * (tolerance / moved) ** power))
 
     def prepare(self, kernel: Kernel, table: Table, columns: Columns, step: Array, t_end: float | Array) -> None:
@@ -49,7 +74,7 @@ class RungeKutta(Stepper):
     def body(self, kernel: Kernel):
         model, layout = kernel.model, kernel.layout
         load_states, load_constants, _ = make_access(model, layout)
-        step, watch = make_step(self.tableau, model.rhs, len(model.states)), kernel.make_watch()
+        step, watch = make_step(self, model.rhs, len(model.states)), kernel.make_watch()
         accept = make_accept(model, layout)
         STEP, GOAL, DONE, STATUS = map(layout.at, ("step", "goal", "done", "status"))
         block, pack, wide = BLOCK, PACK, full_width()
@@ -71,7 +96,7 @@ class RungeKutta(Stepper):
         return body
 
 
-def make_step(tableau: Tableau, rhs, n_states: int):
+def make_step(tableau: RungeKutta, rhs, n_states: int):
     """Inline (states, constants, h) -> (states, spin, work, sound, airborne, jammed): one step.
 
     Returns the states after the time h; the spin before the step; the integral of the dissipated power over the
@@ -100,17 +125,27 @@ def make_step(tableau: Tableau, rhs, n_states: int):
     return compile_inline("step", "y, p, h", lines, {"rhs": rhs})
 
 
-def method(tableau: Tableau) -> RungeKutta:
-    """Return the method of a tableau."""
-    return RungeKutta(
-        name=tableau.name,
-        code=tableau.code,
-        summary=tableau.summary,
-        step_words=f"{STABILITY_SHARE:g} of the stability limit",
-        step_cost=tableau.stages / DOPRI5.stages,
-        automatic=tableau.automatic,
-        error_order=tableau.order,
-        takes_every_step=True,
-        real_stability=tableau.real_stability,
-        tableau=tableau,
-    )
+# Dormand & Prince (1980), J. Comput. Appl. Math. 6, 19, table 2: RK5(4)7M.  Its seventh stage
+# is left out: it serves only the embedded error estimate, which a fixed step does not use.
+DOPRI5 = RungeKutta(
+    name="dopri5",
+    code=0,
+    summary="the Runge-Kutta formula of order five by Dormand and Prince, with a fixed step, for every model",
+    automatic=True,
+    error_order=5,
+    a=(
+        (F(1, 5),),
+        (F(3, 40), F(9, 40)),
+        (F(44, 45), F(-56, 15), F(32, 9)),
+        (F(19372, 6561), F(-25360, 2187), F(64448, 6561), F(-212, 729)),
+        (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
+    ),
+    b=(F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
+    c=(F(0), F(1, 5), F(3, 10), F(4, 5), F(8, 9), F(1)),
+    real_stability=3.3066,
+    phase=1.0,
+    layer_error=0.02,
+)
+
+TABLEAUS = (DOPRI5,)
+"""All tableaus; the first runs every model."""

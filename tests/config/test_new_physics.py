@@ -61,15 +61,15 @@ from fractions import Fraction as F
 
 import numpy as np
 
-from sweep.kernels import methods, runge_kutta
-from sweep.kernels.tableau import Tableau
+from sweep.kernels import methods
+from sweep.kernels.runge_kutta import RungeKutta
 
-methods.METHODS["rk4"] = runge_kutta.method(Tableau(
-    name="rk4", code=9, summary="the classical formula", order=4,
+methods.METHODS["rk4"] = RungeKutta(
+    name="rk4", code=9, summary="the classical formula", error_order=4, step_cost=4 / 6,
     a=((F(1, 2),), (F(0), F(1, 2)), (F(0), F(0), F(1))),
     b=(F(1, 6), F(1, 3), F(1, 3), F(1, 6)), c=(F(0), F(1, 2), F(1, 2), F(1)),
     real_stability=2.7853, phase=0.3, layer_error=0.1,
-))  # before anybody has read the registry
+)  # before anybody has read the registry
 
 import sweep
 

@@ -10,8 +10,8 @@ from support.ripple import form as numerical_form
 from sweep.kernels import methods
 from sweep.kernels.layout import BLOCK
 from sweep.kernels.method import ACCURACY, STABILITY
+from sweep.kernels.runge_kutta import DOPRI5
 from sweep.kernels.status import DIVERGED, TIME_LIMIT
-from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import take

@@ -11,8 +11,8 @@ from sweep.kernels.adams.step import HISTORY
 from sweep.kernels.kernel import Kernel
 from sweep.kernels.layout import LANES
 from sweep.kernels.methods import automatic_step
+from sweep.kernels.runge_kutta import DOPRI5
 from sweep.kernels.status import LIFT_OFF, RUNNING
-from sweep.kernels.tableau import DOPRI5
 from sweep.models import MODELS
 from sweep.models.ladder import slip
 from sweep.models.model import Columns, take

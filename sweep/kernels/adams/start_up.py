@@ -30,9 +30,8 @@ from sweep.kernels.adams.step import (
 from sweep.kernels.adams.weights import plain_weights
 from sweep.kernels.codegen import make_accept, make_access, make_scatter
 from sweep.kernels.layout import LANES, Layout, Table, constants_of
-from sweep.kernels.runge_kutta import make_step
+from sweep.kernels.runge_kutta import DOPRI5, make_step
 from sweep.kernels.status import RUNNING
-from sweep.kernels.tableau import DOPRI5
 from sweep.models.model import Array
 from sweep.models.stiff.form import StiffForm
 from sweep.models.theory.rocking import implicit
