@@ -35,12 +35,9 @@ class Rules:
 
 
 @dataclass(frozen=True)
-class Cells:
-    """Cells that are run with one method."""
+class Choice:
+    """How to run the cells of one method."""
 
-    model: Model
-    """The model in its users' variables; the kernel's model may have others."""
-    rules: Rules
     kernel: Kernel
     cells: Array
     """Indices among all cells of a batch, shape (cells,)."""
@@ -50,6 +47,15 @@ class Cells:
     """The longest permitted step, in sqrt(c/g), shape (cells,)."""
     step_rule: Array
     """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cells(Choice):
+    """The same cells, with all that is needed to run them."""
+
+    model: Model
+    """The model in its users' variables; the kernel's model may have others."""
+    rules: Rules
     tolerance: Array
     """The tolerance for which each is integrated, at most that of the rules, shape (cells,)."""
     stable: StableRanges

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
 from sweep.config import Config
-from sweep.engine.cells import Cells, Rules
+from sweep.engine.cells import Cells, Choice, Rules
 from sweep.grid import Array, Grid
 from sweep.jit import on_all_threads
 from sweep.kernels import methods
@@ -55,20 +54,6 @@ class Plan:
         ]
 
 
-class Choice(NamedTuple):
-    """How to run the cells of one method."""
-
-    kernel: Kernel
-    cells: Array
-    """Indices among all cells, shape (cells,)."""
-    columns: Columns
-    """Physical parameters by name, each of shape (cells,)."""
-    step: Array
-    """The longest permitted step, in sqrt(c/g), shape (cells,)."""
-    step_rule: Array
-    """What determined this step (`sweep.kernels.method.STEP_RULES`), shape (cells,)."""
-
-
 def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     """Prepare each cell of `grids`, by default all cells of `config`: method, step, limits and initial state.
 
@@ -88,8 +73,8 @@ def plan(config: Config, *grids: Grid, also: Sequence[str] = ()) -> Plan:
     parts = list[Cells]()
     for each in chosen:
         theirs = take(stable, each.cells)
-        rows = each.kernel.initial(each.columns, theirs)
-        parts.append(Cells(config.equations, rules, *each, np.full(len(rows), tolerance), theirs, rows))
+        rows, fine = each.kernel.initial(each.columns, theirs), np.full(len(each.cells), tolerance)
+        parts.append(Cells(**vars(each), model=config.equations, rules=rules, tolerance=fine, stable=theirs, rows=rows))
     return Plan(config, grids, predictions, tuple(parts))
 
 

@@ -86,9 +86,11 @@ def simulate(
     stable = predict(chosen, Grid({}, {}, dict(columns))).ranges
     steps = np.broadcast_to(steps, cells).astype(float)
     if decide:
-        rules, each = Rules(t_end, tolerance, settles=settle), np.full(cells, tolerance)
-        rule, rows = np.zeros(cells), kernel.initial(columns, stable)
-        lives = Lives(Cells(chosen, rules, kernel, np.arange(cells), columns, steps, rule, each, stable, rows))
+        every, rows = np.arange(cells), kernel.initial(columns, stable)
+        lives = Lives(Cells(
+            kernel, every, columns, steps, np.zeros(cells), model=chosen, tolerance=np.full(cells, tolerance),
+            rules=Rules(t_end, tolerance, settles=settle), stable=stable, rows=rows,
+        ))  # fmt: skip
         live([lives])
         return Ends(kernel, lives.rows, t_end)
     rows = kernel.start(columns, steps, t_end, stable)
