@@ -147,15 +147,16 @@ def _of_counts(first: Cells, second: Cells, left: Ending, larger: Array) -> tupl
     return count, of_margins
 
 
-def doubted_counts(cells: Cells, errors: Errors) -> dict[Doubt, Array]:
-    """Return which cells' counts the second runs give reason to doubt, masks of shape (cells,), by the reason."""
-    against, count, sound = {}, cells.recorded(Reversals.name), ~cells.failed
+def doubts_of_counts(cells: Cells, errors: Errors) -> Array:
+    """Return the doubts that second runs raise about the counts of first runs, bits of `Doubt`, shape (cells,)."""
+    count = cells.recorded(Reversals.name)
+    doubts: Array = np.zeros(len(count), int)
     if Reversals.name in cells.kernel.measure:
-        against[Doubt.STEP] = sound & (errors.reversals != count)  # a failed second run has the count NaN
+        doubts |= Doubt.STEP * (errors.reversals != count)  # a failed second run has the count NaN
     if Margin.name in cells.kernel.measure:
-        against[Doubt.MARGIN] = (cells.status == SETTLED) & ~(errors.of_margins < 1)
-        against[Doubt.PARITY] = sound & ~_consistent(cells, count)
-    return against
+        doubts |= Doubt.MARGIN * ((cells.status == SETTLED) & ~(errors.of_margins < 1))
+        doubts |= Doubt.PARITY * ~_consistent(cells, count)
+    return doubts
 
 
 def _consistent(cells: Cells, count: Array) -> Array:

@@ -30,7 +30,7 @@ from sweep.engine.errors import (
     Errors,
     allowed,
     compare,
-    doubted_counts,
+    doubts_of_counts,
     imbalance,
     limited_by_round_off,
     second_steps,
@@ -157,7 +157,6 @@ def _judged(lives: Lives, which: Array, met: Met) -> Going:
     if rules.fixed:
         back = here[begun[~again]]
         lives.rows[back], lives.notes["step"][back] = lives.before[back], lives.notes["step_before"][back]
-    lives.notes["missed"][here] = doubtful[~again] & (not rules.fixed)
     table = lives.cells.kernel.table(lives.rows[here])
     _set_outcome(lives.cells, table, take(met, ~again), take(before, ~again), true[~again], unsound[~again])
     lives.rows[here], lives.notes["halvings"][here], lives.notes["met"][here] = table.rows, 0, 0
@@ -219,8 +218,9 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
     permitted, known = allowed(first, first.rules.tolerance), ~limited_by_round_off(first)
     excess = np.where(known, found.spin / (AIM * permitted), 0.0)
     by_chance = known & (excess <= 1) & (OF_RATTLE * found.rattle > AIM * permitted)
+    doubts = doubts_of_counts(first, found)
     if first.rules.by_count:
-        excess = np.where(coarse, np.fmax(excess, _of_count(first, found)), excess)
+        excess = np.where(coarse, np.fmax(excess, _of_count(first, found, doubts)), excess)
     shorter, most = _shorter(first, found, excess, by_chance, coarse, notes[which])
     again = np.isfinite(shorter) & first.rules.repeats
     missed = ~again & known & (found.reported > permitted) & (not first.rules.fixed)
@@ -230,7 +230,7 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
     found = found._replace(spin=np.where(missed, np.fmax(found.spin, highest - lowest), found.spin))
     lives.rows[which] = first.rows
     note(notes, "error", which, found)
-    notes["missed"][which] = missed
+    notes["doubts"][which] = doubts | Doubt.TOLERANCE * missed
     notes["repeats"][which] += again
     notes["count"][which] = np.where(first.rules.by_count & again & ~coarse, count, notes["count"][which])
     notes["most_excess"][which[again]] = most[again]
@@ -239,17 +239,17 @@ def _after_second_run(lives: Lives, which: Array) -> Going:
     yield which[~again], Done()
 
 
-def _of_count(run: Cells, errors: Errors) -> Array:
+def _of_count(run: Cells, errors: Errors, doubts: Array) -> Array:
     """Return the factor by which errors of a coarse run have to fall for a count to be certain, shape (cells,).
 
     It is infinite where this is unknown: if the second run counts otherwise, or the spin cannot be predicted beyond the
     first leg. A parity that contradicts the spin says nothing at a time limit, because the spin may be about to
     reverse.
     """
-    against, limited = doubted_counts(run, errors), run.status == TIME_LIMIT
-    unpredicted = limited if run.rules.first_leg is not None else np.zeros(len(limited), bool)
-    another = against[Doubt.STEP] | (against[Doubt.PARITY] & ~limited) | unpredicted
-    factor = np.where(against[Doubt.MARGIN], errors.of_margins / AIM, 0.0)
+    limited = run.status == TIME_LIMIT
+    unpredicted = limited & (run.rules.first_leg is not None)
+    another = (doubts & Doubt.STEP > 0) | ((doubts & Doubt.PARITY > 0) & ~limited) | unpredicted
+    factor = np.where(doubts & Doubt.MARGIN, errors.of_margins / AIM, 0.0)
     return np.where(another | np.isnan(factor), np.inf, factor)
 
 

@@ -32,15 +32,14 @@ NOTES = np.dtype([
     ("stage", float), ("leg", float), ("step", float), ("step_rule", float), ("tolerance", float),
     ("halvings", float), ("step_before", float), ("met", [(name, float) for name in Met._fields]),
     ("repeats", float), ("count", float), ("lowest", float), ("highest", float), ("most_excess", float),
-    ("missed", bool), ("error", [(name, float) for name in Errors._fields]),
+    ("doubts", int), ("error", [(name, float) for name in Errors._fields]),
     ("left", [(name, float) for name in Ending._fields]),
 ])  # fmt: skip
 """What is noted of each cell: its stage and leg; its step, what determined it (`STEP_RULES`), and its tolerance;
 how often the step was halved because of a failure, the step before, and what the last run met; how often the cell was
 repeated because of its error, what the last run counted before if it was not coarse, the lowest and the highest spin
-at the ends of its runs, the largest excess of the error with which another repeat is of use, and whether it misses its
-tolerance; its error; and what was left to come of its
-spin when the run stopped."""
+at the ends of its runs, and the largest excess of the error with which another repeat is of use; the doubts and the
+error that its second run gives; and what was left to come of its spin when the run stopped."""
 
 
 class Resume(NamedTuple):

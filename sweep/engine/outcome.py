@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sweep.engine.cells import Cells
-from sweep.engine.errors import Errors, doubted_counts
+from sweep.engine.errors import Errors
 from sweep.engine.lives import Lives
 from sweep.engine.plan import Plan
 from sweep.grid import Array
+from sweep.kernels.layout import Table
+from sweep.kernels.measures.margin import Margin
 from sweep.kernels.methods import AUTO
 from sweep.kernels.status import COUNT_DOUBTS, IMPOSSIBLE, SETTLED, TIME_LIMIT, Doubt
 from sweep.results import dataset
@@ -36,22 +37,18 @@ def _found(lives: Lives) -> dict[str, Array]:
     cells = lives.take()
     found = dataset.measured(cells.kernel, cells.rows, cells.rules.t_end, lives.left())
     found["step_rule"] = cells.step_rule
-    against = {Doubt.TIME_LIMIT: found["status"] == TIME_LIMIT} if "reversals" in found else {}
     if cells.rules.twice:
-        against |= _estimated(lives, cells, found)
-    for bit, where in against.items():
-        found["doubts"] |= bit * where
-    sound = np.isin(found["status"], (SETTLED, TIME_LIMIT))
-    found["doubts"][~sound] = 0
-    if Doubt.MARGIN in against:
+        found["spin_error"] = np.where(found["doubts"] & Doubt.ROUND_OFF, np.nan, _spin_error(lives, cells.table))
+    limited, sound = found["status"] == TIME_LIMIT, np.isin(found["status"], (SETTLED, TIME_LIMIT))
+    doubts = found["doubts"] | lives.notes["doubts"] | Doubt.TIME_LIMIT * (limited & ("reversals" in found))
+    found["doubts"] = np.where(sound, doubts, 0)
+    if cells.rules.twice and Margin.name in cells.kernel.measure:
         found["certain"] = sound & (found["doubts"] & COUNT_DOUBTS == 0)
     return found
 
 
-def _estimated(lives: Lives, cells: Cells, found: dict[str, Array]) -> dict[Doubt, Array]:
-    """Add the errors of cells that were run twice to `found`; return which cells they give reason to doubt."""
-    errors, table = Errors(*(lives.notes["error"][name] for name in Errors._fields)), cells.table
+def _spin_error(lives: Lives, table: Table) -> Array:
+    """Return the errors of the final spins: those that second runs give, or those at failures."""
+    errors = Errors(*(lives.notes["error"][name] for name in Errors._fields))
     spin = np.where(np.isinf(errors.spin), np.nan, errors.spin)
-    errors = errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin))
-    found["spin_error"] = np.where(found["doubts"] & Doubt.ROUND_OFF, np.nan, errors.reported)
-    return {Doubt.TOLERANCE: lives.notes["missed"]} | doubted_counts(cells, errors)
+    return errors._replace(spin=np.where(table["failed_at"] > 0, table["failed_error"], spin)).reported
