@@ -24,6 +24,9 @@ moments, difference of the radii and squared frequency: the four factors that Ko
 arXiv:1704.06717, abstract) name for the formula of Garcia and Hubbard.  The two σ are proportional to the squared
 frequencies, with opposite signs.
 
+(R1 - R2) (M⁻¹)_12 is an element of R M⁻¹ - M⁻¹ R, which is the same along all axes.  Along those of the inertia, which
+are the axes of the states, it is R_12 (1/M_2 - 1/M_1), where R_12 = k_12/g is that of the stiffness k.
+
 The time.  Where only the growing mode counts, (n - n_c)² + 2 E/J = N² is conserved, n_c being the spin at which the
 mode neither grows nor decays: zero without friction, the critical spin of (abdot) with it.  So
 
@@ -47,33 +50,30 @@ from sweep.models.theory.rocking import frequencies
 
 def growth(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """σ of the slower and of the faster mode, half the rate per spin at which its energy grows, shape (cells,)."""
-    k1, k2 = rigid_body.stiffness(columns, surface)  # R1 - h and R2 - h
-    J11, J22, _, J12, _, _ = rigid_body.about_surface(columns)
-    h = rigid_body.height(columns)
-    coupling = J12 / ((J11 + h**2) * (J22 + h**2) - J12**2)
-    lower, higher = frequencies(rigid_body.rocking(columns, surface))
+    of, arm = rigid_body.rocking(columns, surface), rigid_body.height(columns) / rigid_body.gravity(columns)
+    lower, higher = frequencies(of)
+    coupling = arm * of.C22 * (of.B12 + of.B21)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shared = h * (k1 - k2) * coupling / (2 * (higher**2 - lower**2))
+        shared = coupling / (2 * (higher**2 - lower**2))
     # If a body is round in both directions, the modes are arbitrary, and nothing is coupled.
-    shared = np.where((k1 == k2) | (coupling == 0), 0.0, shared)
+    shared = np.where(coupling == 0, 0.0, shared)
     return shared * lower**2, -shared * higher**2
 
 
 def energies(columns: Columns, surface: Surface = ELLIPSOID) -> tuple[Array, Array]:
     """Energies of the slower and of the faster mode at the start, per unit mass, shape (cells,)."""
-    J11, J22, _, J12, _, _ = rigid_body.about_surface(columns)
-    h2 = rigid_body.height(columns) ** 2
-    k1, k2 = (np.sqrt(rigid_body.gravity(columns) * k) for k in rigid_body.stiffness(columns, surface))
-    # In the coordinates (k1 u1, k2 u2) the stiffness is one, and the eigenvalues of the inertia are 1/ν².
-    M11, M22, M12 = (J22 + h2) / k1**2, (J11 + h2) / k2**2, -J12 / (k1 * k2)
-    values, modes = np.linalg.eigh(matrix(M11, M12, M12, M22))
+    of = rigid_body.rocking(columns, surface)
+    # With u multiplied by the roots of the moments of inertia, these are one, and the stiffness has the eigenvalues ν².
+    root1, root2 = np.sqrt(1 / of.B12), np.sqrt(-1 / of.B21)
+    mixed = -of.C22 / (root1 * root2)
+    _, modes = np.linalg.eigh(matrix(-of.C21 / root1**2, mixed, mixed, of.C12 / root2**2))
     u1, u2, w1, w2, w3 = starts.rolling(columns, surface)
-    u3, back = -np.sqrt(1 - u1**2 - u2**2), -rigid_body.axes(columns)
-    moves = rigid_body.turned(u2 * w3 - u3 * w2, u3 * w1 - u1 * w3, back)  # u' = u × ω, in the axes of the surface
-    u1, u2 = rigid_body.turned(u1, u2, back)
-    q, p = (np.einsum("...i,...ik->...k", np.stack([k1 * x, k2 * y], axis=-1), modes) for x, y in ((u1, u2), moves))
-    found = 0.5 * (q**2 + values * p**2)
-    return found[..., 1], found[..., 0]
+    u3 = -np.sqrt(1 - u1**2 - u2**2)
+    moves = u2 * w3 - u3 * w2, u3 * w1 - u1 * w3  # u' = u × ω
+    weighted = (np.stack([root1 * x, root2 * y], axis=-1) for x, y in ((u1, u2), moves))
+    q, p = (np.einsum("...i,...ik->k...", each, modes) for each in weighted)
+    lower, higher = 0.5 * (np.stack(frequencies(of)) ** 2 * q**2 + p**2)
+    return lower, higher
 
 
 def first_reversal(columns: Columns, n_c: tuple[Array, Array], surface: Surface = ELLIPSOID) -> Array:
