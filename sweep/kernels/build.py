@@ -101,7 +101,9 @@ def build_estimates(model: Model) -> None:
 
 def missing(kernels: Sequence[Kernel], *also: str) -> list[Job]:
     """List the pieces that the cache lacks to run `kernels`; `also` as in `build`."""
-    return list(dict.fromkeys((piece, kernel.model.origin) for kernel in kernels for piece in _missing(kernel, also)))
+    pieces = (KERNEL, EXCHANGE, FOLLOW, BEGINNING, *also)  # the longest first
+    lacking = ((piece, kernel.model.origin) for kernel in kernels for piece in _lacking(kernel, pieces))
+    return list(dict.fromkeys(lacking))
 
 
 def compile_seconds(jobs: Sequence[Job]) -> float:
@@ -118,11 +120,6 @@ def try_compiling(model: Model) -> None:
         for function, arguments in ((model.rhs, (states, constants)), (model.energy, (states, constants)),
                                     (model.tilt, (states,))):  # fmt: skip
             compiled(function).compile(tuple(map(numba.typeof, arguments)))
-
-
-def _missing(kernel: Kernel, also: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """List the pieces that the cache lacks to run `kernel`, as arguments of this module, the longest first."""
-    return _lacking(kernel, (KERNEL, EXCHANGE, FOLLOW, BEGINNING, *also))
 
 
 def _lacking(kernel: Kernel, pieces: Iterable[str]) -> Iterator[tuple[str, ...]]:

@@ -28,7 +28,6 @@ value of sqrt(g/c) in their own units (`spin_unit`).
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -251,11 +250,6 @@ class Model(Tier):
     def key(self) -> str:
         """The name of its compiled code, which differs from that of every other model."""
         return f"{self.name}@{self.origin.digest}" if self.origin else self.name
-
-
-def named(*fields: str):
-    """A base for constants whose fields are put together from several lists: a `NamedTuple` class."""
-    return namedtuple("Constants", fields)
 
 
 def take(record: Any, cells: Any) -> Any:

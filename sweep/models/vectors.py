@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 
 class Vector(NamedTuple):
     """A vector by its components."""
@@ -40,6 +42,12 @@ class Vector(NamedTuple):
             self.z * other.x - self.x * other.z,
             self.x * other.y - self.y * other.x,
         )
+
+
+def along_turned(first: Any, second: Any, angle: Any) -> tuple[Any, Any, Any]:
+    """Elements 11, 12 and 22 of the matrix diag(first, second) along axes that are turned by `angle` about z."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return first * cos**2 + second * sin**2, (second - first) * sin * cos, first * sin**2 + second * cos**2
 
 
 class Symmetric(NamedTuple):

@@ -8,7 +8,7 @@ from support import columns, wide_bodies
 from support.physics import KANE_LEVINSON
 
 from sweep.models import MODELS, find
-from sweep.models.model import Model
+from sweep.models.model import Model, stack
 from sweep.models.theory import linear, stability
 from sweep.models.theory.polynomials import Polynomial, X, real_roots, values_and_slopes
 
@@ -41,7 +41,7 @@ def test_the_polynomial_is_the_determinant(name: str) -> None:
         rate = model.spin_unit(body) * (random.normal(size=1000) + 1j * random.normal(size=1000))
         matrix = rate[:, None, None] * np.eye(6) - linear.jacobian(model, constants, spin)
         determinant = constants.J11 * constants.J22 * np.linalg.det(matrix)
-        coefficients = linear.characteristic(model, constants, spin)
+        coefficients = stack(model.characteristic(spin, constants))
         np.testing.assert_allclose((coefficients * rate ** np.arange(7)[:, None]).sum(axis=0), determinant, rtol=1e-10)
 
 

@@ -75,7 +75,7 @@ class Adams(Stepper):
 
     def accurate_step(self, model: Model, columns: Columns, motion: Array, decay: Array, tolerance: Tolerance) -> Array:
         form = form_of(model)
-        reach, at_rest = linear.fastest_spin(form.full, columns) * form.time_unit(columns), form.rest_decay(columns)
+        reach, at_rest = linear.fastest_spin(form.full, columns) / model.spin_unit(columns), form.rest_decay(columns)
         rise = np.divide(decay, at_rest, out=np.full_like(decay, 2.0), where=at_rest > 0) - 1  # 2 without friction
         phase = (tolerance / np.maximum(rise * reach, tolerance)) ** (1 / _POWER)
         return np.asarray(np.minimum(phase, _LONGEST_PHASE) / np.maximum(motion, form.damping(columns)))
@@ -201,7 +201,7 @@ def _set_looks(kernel: Kernel, table: Table, columns: Columns) -> None:
     """Set the energy below which, and the step after which, looks search for something to skip."""
     model = kernel.model
     reach, goal = linear.fastest_spin(model, columns), table["goal"]
-    tolerance = kernel.tolerance / form_of(model).time_unit(columns)
+    tolerance = kernel.tolerance * model.spin_unit(columns)
     table["quiet_energy"] = skips.quiet_energy(reach)
     time = goal * table["step"]
     table["quiet_after"] = skips.first_look(model, columns, reach, time, goal, tolerance)

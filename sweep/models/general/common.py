@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -14,7 +15,7 @@ from sweep.models.general import rigid_body, validity
 from sweep.models.general.couples import Couple
 from sweep.models.general.laws import LAWS, Law
 from sweep.models.general.surfaces import ELLIPSOID, Surface
-from sweep.models.model import PLAIN, Array, Assumptions, Columns, Offer, named, zeros
+from sweep.models.model import PLAIN, Array, Assumptions, Columns, Offer, zeros
 from sweep.models.symbols import Constants, specialised
 
 SOLID = "solid"
@@ -124,7 +125,9 @@ class Variant:
         """
         body, couples, surface, known, has = self.body, self.couples, self.surface, self.known, self.has
 
-        class Record(named(*body, *(name for couple in couples for name in couple.constants), *more)):  # type: ignore[misc]
+        fields = (*body, *(name for couple in couples for name in couple.constants), *more)
+
+        class Record(namedtuple("Constants", fields)):  # type: ignore[misc]
             @classmethod
             def of(cls, columns: Columns) -> Record:
                 names = (*surface.constants, *rigid_body.BODY)

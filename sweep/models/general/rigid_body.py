@@ -20,7 +20,7 @@ import numpy as np
 from sweep.models.general.surfaces import ELLIPSOID, Surface, offset
 from sweep.models.model import Array, Columns
 from sweep.models.theory.rocking import Rocking, longer_period
-from sweep.models.vectors import Symmetric, Vector
+from sweep.models.vectors import Symmetric, Vector, along_turned
 
 INERTIA = ("J11", "J22", "J33", "J13", "J23")
 
@@ -72,8 +72,8 @@ def about_surface(columns: Columns) -> tuple[Array, ...]:
         given = (columns.get(name, nothing) for name in (*MOMENTS, *PRODUCTS))
         return tuple(element / mass(columns) for element in given)
     J1, J2, J3 = homogeneous(columns)
-    cos, sin = np.cos(columns["delta"]), np.sin(columns["delta"])
-    return J1 * cos**2 + J2 * sin**2, J1 * sin**2 + J2 * cos**2, J3, (J1 - J2) * sin * cos, nothing, nothing
+    J11, J12, J22 = along_turned(J1, J2, -columns["delta"])
+    return J11, J22, J3, J12, nothing, nothing
 
 
 def axes(columns: Columns) -> Array:

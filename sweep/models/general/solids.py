@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from sweep.models.model import Array, Columns
+from sweep.models.vectors import along_turned
 
 _ROUNDING = 1e-12
 
@@ -70,12 +71,11 @@ class Ellipsoid(Solid):
         a, b, c = ((surface | solid)[axis] for axis in _SIZES)
         below = 0 if self.whole else 3 * c / 8
         mass = _mass(given, (4 if self.whole else 2) / 3 * np.pi * a * b * c)
-        cos, sin = np.cos(given["angle"]), np.sin(given["angle"])
         along, across = mass * ((b**2 + c**2) / 5 - below**2), mass * ((a**2 + c**2) / 5 - below**2)
+        Ixx, Ixy, Iyy = along_turned(along, across, -given["angle"])
         return {
             **surface, "offset": surface["c"] - (c - below), "mass": mass,
-            "Ixx": along * cos**2 + across * sin**2, "Iyy": along * sin**2 + across * cos**2,
-            "Izz": mass * (a**2 + b**2) / 5, "Ixy": (along - across) * sin * cos,
+            "Ixx": Ixx, "Iyy": Iyy, "Izz": mass * (a**2 + b**2) / 5, "Ixy": Ixy,
         }  # fmt: skip
 
 

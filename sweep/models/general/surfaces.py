@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from sweep.models.model import Array, Columns
-from sweep.models.vectors import Symmetric, Vector
+from sweep.models.vectors import Symmetric, Vector, along_turned
 from sweep.units import NUMBER
 
 
@@ -86,10 +86,7 @@ def _ellipsoid_excess(columns: Columns) -> tuple[Array, Array]:
 
 def _ellipsoid_matrix(columns: Columns, angle: Array) -> tuple[Array, ...]:
     """A11, A12, A22 and A33, and the offset."""
-    a2, b2, c2 = columns["a"] ** 2, columns["b"] ** 2, columns["c"] ** 2
-    cos, sin = np.cos(angle), np.sin(angle)
-    mixed = (b2 - a2) * sin * cos
-    return a2 * cos**2 + b2 * sin**2, mixed, a2 * sin**2 + b2 * cos**2, c2, offset(columns)
+    return *along_turned(columns["a"] ** 2, columns["b"] ** 2, angle), columns["c"] ** 2, offset(columns)
 
 
 def _ellipsoid_point(u: Vector, c3, p):
@@ -138,11 +135,7 @@ def _paraboloid_excess(columns: Columns) -> tuple[Array, Array]:
 
 def _paraboloid_matrix(columns: Columns, angle: Array) -> tuple[Array, ...]:
     """S11, S12 and S22, and h."""
-    radius1, radius2 = _paraboloid_radii(columns)
-    cos, sin = np.cos(angle), np.sin(angle)
-    mixed = (radius2 - radius1) * sin * cos
-    h = columns["c"] - offset(columns)
-    return radius1 * cos**2 + radius2 * sin**2, mixed, radius1 * sin**2 + radius2 * cos**2, h
+    return *along_turned(*_paraboloid_radii(columns), angle), columns["c"] - offset(columns)
 
 
 def _paraboloid_point(u: Vector, c3, p):

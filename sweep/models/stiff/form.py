@@ -48,8 +48,6 @@ class StiffForm:
     """Inline, (p) -> the `Rocking` about upright rest without slip."""
     unit: Callable[[Any], Any]
     """Inline, (p) -> sqrt(g/h), with the height h of the centre of mass: in the paper's units of spin 1."""
-    time_unit: Callable[[Columns], Array]
-    """(columns) -> sqrt(c/g) in the model's units, shape (cells,)."""
     slip_decay: Callable[[Columns], Array]
     """(columns) -> rate at which the slip decays at first, shape (cells,)."""
     rest_decay: Callable[[Columns], Array]

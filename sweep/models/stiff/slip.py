@@ -134,7 +134,6 @@ def _form_of(scene: Variant) -> StiffForm:
         power=scene.inline(record, power, **number(("R", "v1", "v2")), geometry=Geometry),
         rocking=scene.inline(record, rigid_body.rocking_on(surface)),
         unit=scene.inline(record, unit),
-        time_unit=lambda columns: 1 / rigid_body.spin_unit(columns),
         slip_decay=lambda columns: 2.2 * (rest_decay(columns) + rigid_body.spin_unit(columns)),
         rest_decay=rest_decay,
         damping=lambda columns: couples_decay(scene, columns),

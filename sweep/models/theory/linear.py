@@ -39,12 +39,6 @@ def derivative(function: Callable[[Array], tuple[Array, ...]], states: Array, wh
     return np.moveaxis(np.concatenate(columns, axis=1), -1, 0)
 
 
-def characteristic(model: Model, constants, spin: Array) -> Array:
-    """Coefficients of the characteristic polynomial in λ, lowest power first, of a model that has one, (7, cells)."""
-    assert model.characteristic
-    return stack(model.characteristic(spin, constants))
-
-
 def rates(model: Model, constants, spin: Array) -> Array:
     """Find the eigenvalues λ of the rattle, in sqrt(g/c), shape (cells, m), where m is the number of states without the
     spin.
@@ -54,7 +48,7 @@ def rates(model: Model, constants, spin: Array) -> Array:
     """
     if not model.characteristic:
         return np.asarray(np.linalg.eigvals(jacobian(model, constants, spin)))
-    found, sound = _roots(characteristic(model, constants, spin))
+    found, sound = _roots(stack(model.characteristic(spin, constants)))
     others = np.flatnonzero(~sound)
     if len(others):
         found[others] = np.linalg.eigvals(jacobian(model, take(constants, others), spin[others]))
