@@ -237,7 +237,7 @@ def _integrator(values: Any, model: Tier, measure: tuple[str, ...], slowest: flo
     if "method" not in said:
         choice = isinstance(model, Model) and len(methods.automatic(model, measure)) > 1 and integrator.step == "auto"
         found["method"] = methods.AUTO if choice else methods.PLAIN
-    if "stop_early" not in said and not all(each.settles for each in measures.chosen(measure)):
+    if "stop_early" not in said and not all(each.final_when_settled for each in measures.chosen(measure)):
         found["stop_early"] = integrator.t_end >= schema.FOREVER
         said = {*said, "stop_early"}
     if "t_end" not in said:

@@ -129,7 +129,7 @@ def _of_counts(first: Cells, second: Cells, left: Ending, larger: Array) -> tupl
 
     `larger` is the ratio of the difference of two runs to the error, shape (cells,). Two runs may agree in one margin
     by chance, however wrong both are; that they agree in both is less likely. So the larger error counts for both,
-    unless a couple slows the spin, and with it the error of the overshoot.
+    unless a couple damps the spin, and with it the error of the overshoot.
     """
     if Reversals.name not in first.kernel.measure:
         return np.full(len(larger), np.nan), np.full(len(larger), np.nan)
@@ -141,7 +141,7 @@ def _of_counts(first: Cells, second: Cells, left: Ending, larger: Array) -> tupl
     overshoot, nearest = (np.abs(one - another) / larger for one, another in zip(ours[1:], theirs[1:], strict=True))
     both, more, fewer = np.fmax(overshoot, nearest), *margins(first.table, left)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = (nearest if first.model.slows else both) / more
+        relative = (nearest if first.model.damped else both) / more
         relative = np.where(first.table["reversals"] > 0, np.maximum(relative, both / fewer), relative)
     count, of_margins = np.where(second.failed, np.nan, [theirs.reversals, CLEAR * relative])
     return count, of_margins

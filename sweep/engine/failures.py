@@ -1,7 +1,7 @@
 """Finds out what failed runs met.
 
 Too long a step can produce a spurious lift-off, jam or topple. So a failed run is stopped a few steps ahead of its
-failure and followed from there (`sweep.kernels.failure`).
+failure and integrated from there in short ones (`sweep.kernels.failure`).
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from sweep.kernels.status import RUNNING
 from sweep.models.model import stack, take
 
 AHEAD = 8
-"""Number of steps ahead of a failure from which a run is followed. The longest history of a method has eight points, so
+"""Number of steps ahead of a failure from which a run is examined. The longest history of a method has eight points, so
 none of them comes from the failure."""
 
-# Number of steps beyond a failure to which a run is followed.
+# Number of steps beyond a failure to which a run is examined.
 _BEYOND = 2
 
 UNSOUND = 0.01
 """Relative error of the energy balance above which a run is never considered sound."""
 
-# Number of cells followed between two calls of `after_chunk`: half a second at most friction.
+# Number of cells examined between two calls of `after_chunk`: half a second at most friction.
 _AT_A_TIME = 64
 
 
@@ -64,7 +64,7 @@ def unsound(cells: Cells) -> Array:
 
 
 def met(failed: Cells, ahead: Array) -> Met:
-    """Follow failed runs from their states `AHEAD` steps before the failure: state rows, shape (cells, quantities)."""
+    """Examine failed runs from their states `AHEAD` steps before the failure: state rows, shape (cells, quantities)."""
     found, model, table = Met.nothing(len(ahead)), failed.model, failed.table
     constants = model.constants.of(failed.columns)
     late = table["done"] > AHEAD

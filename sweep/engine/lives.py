@@ -158,7 +158,7 @@ class Lives:
                     table["goal"], self.notes["leg"][which] = table["steps"], LATER
                 self.rows[which] = table.rows
             case Approach():
-                # A failure with fewer steps before it is followed from the start (`failures.met`).
+                # A failure with fewer steps before it is examined from the start (`failures.met`).
                 goal = np.maximum(self.table["done"][which] - AHEAD, 1)
                 self._run_again(which, APPROACH, self.started(which), goal=goal)
             case Second(step, t_end, settles):

@@ -39,7 +39,7 @@ _REACH = 4.0
 
 # Least error of the slow equations in spin, relative to the fastest spin that the energy allows, and its ratio to the
 # neglected terms. Of 576 cells of `configs/mu_b.yaml` at n0 = 0.05, stopped at t = 5000 and at 30 000, none that was
-# settled this way had another count at t = 10⁶.
+# ended this way had another count at t = 10⁶.
 _LEAST, _NEGLECTED = 0.02, 3.0
 
 # Above this relative error, the slow equations predict nothing.

@@ -71,7 +71,7 @@ _POLL = 0.05
 def build(kernels: Iterable[Kernel], *also: str) -> None:
     """Compile the pieces that the cache lacks to run `kernels`, in as many processes at a time as this one has threads.
 
-    `also` names further pieces: `PATH` to follow how bodies turn and travel, `FAILING` to look at failures.
+    `also` names further pieces: `PATH` to find how bodies turn and travel, `FAILING` to look at failures.
 
     Anything still missing afterwards, because a process failed or there is no folder for a cache, is compiled where it
     is first used.

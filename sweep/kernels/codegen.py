@@ -15,7 +15,7 @@ from typing import Any
 
 from sweep.faults import CompileError
 from sweep.jit import inline
-from sweep.kernels.layout import Layout, constants_of
+from sweep.kernels.layout import STABLE, Layout, constants_of
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX
 from sweep.models.generated import compile_inline, tuple_of
 from sweep.models.model import Model
@@ -73,6 +73,22 @@ def make_accept(model: Model, layout: Layout):
         return accepted
 
     return accept
+
+
+def make_stays(layout: Layout, beyond: float = 1.0):
+    """Inline (group, lane, lowest, highest) -> whether all spins in between lie in one range in which a rattle decays.
+
+    The range about zero is widened by the factor `beyond`.
+    """
+    FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO = map(layout.at, STABLE[:6])
+
+    @inline
+    def stays(group, lane, lowest, highest):
+        about_zero = (lowest > beyond * group[FROM + lane]) & (highest < beyond * group[TO + lane])
+        below = (lowest > group[BELOW_FROM + lane]) & (highest < group[BELOW_TO + lane])
+        return about_zero | below | ((lowest > group[ABOVE_FROM + lane]) & (highest < group[ABOVE_TO + lane]))
+
+    return stays
 
 
 def make_rest(n_states: int, spin_state: int):

@@ -2,7 +2,7 @@
 
 A step that is too long has stages at states that the trajectory never visits.  If one of these has no positive normal
 force, or no positive Painlevé denominator, the kernel stops, but the step alone may be at fault.  So the same motion
-is followed again from the last sound state, in steps of dopri5 with error control.  A step with such a stage is
+is integrated again from the last sound state, in steps of dopri5 with error control.  A step with such a stage is
 tried again at half its length.  If this never succeeds, the failure is one of the body, at this place and time.
 """
 
@@ -48,7 +48,7 @@ def approach(model: Model, states: Array, constants, stretch: Array) -> tuple[Ar
     Returns
     -------
     The status of each trajectory, shape (cells,): `LIFT_OFF`, `PARADOX` or `TOPPLED`; `RUNNING` if it passes the
-    stretch; `DIVERGED` if the states cannot be followed.  Second, the time from the beginning of the stretch to this,
+    stretch; `DIVERGED` if no step is short enough.  Second, the time from the beginning of the stretch to this,
     in sqrt(c/g), shape (cells,).  Third, the spin at that time, shape (cells,).  Fourth, how much the spin may change
     in the time that the last step leaves, shape (cells,): near a paradox it changes as the root of the time.
     """
@@ -66,17 +66,17 @@ def compiled_approach(model: Model) -> Cached:
     n, record = len(model.states), model.constants
     load = make_gather("rows, i", (f"rows[i, {j}]" for j in range(n)))
     load_constants = make_gather("rows, i", (f"rows[i, {n + j}]" for j in range(len(record._fields))), record)
-    follow = _make_follow(model)
+    integrate = _make_integrate(model)
 
     def run(rows, stretch, found):
         for i in prange(len(rows)):
-            ends = follow(load(rows, i), load_constants(rows, i), stretch[i])
+            ends = integrate(load(rows, i), load_constants(rows, i), stretch[i])
             found[0, i], found[1, i], found[2, i], found[3, i] = ends
 
     return parallel(run, "(f8[:, ::1], f8[::1], f8[:, ::1])", f"approach-{model.key}")
 
 
-def _make_follow(model: Model):
+def _make_integrate(model: Model):
     """Compiled (states, constants, stretch) -> (status, time, spin, doubt): `approach` for one trajectory."""
     n, rhs, tilt = len(model.states), model.rhs, model.tilt
     # Not inlined: it would be compiled three times over.
@@ -118,7 +118,7 @@ def _make_follow(model: Model):
         return now
 
     @compiled
-    def follow(y, p, stretch):
+    def integrate(y, p, stretch):
         time, h, cosine, last = 0.0, stretch / 8.0, np.sqrt(1.0 - tilt(y)), y
         for _ in range(_MOST_STEPS):
             if time >= stretch:
@@ -147,4 +147,4 @@ def _make_follow(model: Model):
             h = h * min(2.0, 0.9 * error**-0.2) if error > 0.0 else 2.0 * h
         return DIVERGED, time, spin(y, p), 0.0
 
-    return follow
+    return integrate

@@ -102,7 +102,7 @@ class Stepper:
         return model
 
     def makes(self, kind: Kind, model: Model) -> bool:
-        """Return whether a measurement can follow its steps in a model that it runs."""
+        """Return whether a measurement can be made in its steps, in a model that it runs."""
         return (self.takes_every_step or not kind.every_step) and {*kind.reads} <= {*self.steps_in(model).states}
 
     def accurate_step(

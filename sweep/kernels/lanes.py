@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.jit import exactly_compiled, full_width, inline
-from sweep.kernels.codegen import make_access, make_rest
+from sweep.kernels.codegen import make_access, make_rest, make_stays
 from sweep.kernels.layout import BEYOND, LANES, PACK, STABLE, Layout
 from sweep.kernels.measures.measurement import Check
 from sweep.kernels.status import DIVERGED, LIFT_OFF, PARADOX, QUIET, RUNNING, SETTLED, TIME_LIMIT
@@ -110,7 +110,7 @@ def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_
     load_states, load_constants, store_states = make_access(model, layout)
     energy, rest = model.energy, make_rest(len(model.states), model.spin_state)
     saturates = bool(model.faint)
-    will_settle = _make_will_settle(layout, may_settle, saturates, slows=model.slows)
+    will_settle = _make_will_settle(layout, may_settle, saturates, damped=model.damped)
     FAINT = layout.at(f"constant.{model.faint}") if saturates else 0
     decides, decided = model.decided is not never_decided, model.decided
     GOAL, DONE, STATUS, ENERGY_ROW, STEP, DECAY, SETTLES = map(
@@ -133,19 +133,19 @@ def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_
             running = status == RUNNING
 
             energy_ratio = 2.0 * rattle / inertia
-            bounded, settled, followed = will_settle(group, lane, spin, energy_ratio)
+            bounded, settled, final = will_settle(group, lane, spin, energy_ratio)
             if saturates:
                 settled = settled & (rattle < group[FAINT + lane])
             if decides:
-                settled = settled | (decided(y, load_constants(group, lane)) & followed)
-            settled = settled | (shown(group, lane) & followed)
+                settled = settled | (decided(y, load_constants(group, lane)) & final)
+            settled = settled | (shown(group, lane) & final)
             stops = group[SETTLES + lane] != 0.0
             ends = SETTLED if settled & stops else RUNNING
             if pauses:
                 small = (energy_ratio < group[QUIET_ENERGY + lane]) & (group[DONE + lane] >= group[QUIET_AFTER + lane])
-                # A rattle that can only decay needs no skip: it settles.  No skip begins while a measurement has
-                # yet to follow the spin, or a reversal just before it would not be counted.
-                ends = QUIET if small & followed & (not ((bounded | settled) & stops)) else ends
+                # A rattle that can only decay needs no skip: it settles.  No skip begins before the measured values
+                # are final, or a reversal just before it would not be counted.
+                ends = QUIET if small & final & (not ((bounded | settled) & stops)) else ends
             ends = TIME_LIMIT if (group[DONE + lane] >= group[GOAL + lane]) & (ends != SETTLED) else ends
             status = ends if running else status
             failed = (status == LIFT_OFF) | (status == PARADOX)
@@ -166,11 +166,11 @@ def make_check(model: Model, layout: Layout, may_settle, shown, measure, energy_
     return check
 
 
-def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: bool):
-    """Inline (group, lane, spin, 2 E / I3) -> (bounded, settled, followed).
+def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, damped: bool):
+    """Inline (group, lane, spin, 2 E / I3) -> (bounded, settled, final).
 
     `bounded` says whether upright spin is stable at this spin; `settled`, whether in addition the spin can reverse no
-    more and the measurements agree; `followed`, whether the measurements agree.
+    more and the measured values are final; `final`, whether these are.
 
     By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 moves the spin on a circle about the critical
     spin n_c of the mode: (n - n_c)² + e is constant.  While the mode decays the spin changes by sqrt(d² + e) - d with
@@ -185,33 +185,27 @@ def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, slows: boo
     had not settled by t = 30 000 do now; none of 5429 counts changed.  It does not hold where
     friction `saturates`, since the rattle that grows there leaves the energies at which the law is linear.
 
-    A couple that `slows` the spin can carry it out of an outer range into one where the rattle grows, or below what is
-    left of a rattle that decays more slowly.  With such a couple a trajectory has settled only within the share of the
+    A couple can damp the spin (`damped`) out of an outer range into one where the rattle grows, or below what is left
+    of a rattle that decays more slowly.  With such a couple a trajectory has settled only within the share of the
     inner range in `STABLE` (`sweep.models.theory.stability`), or when no rattle is left.  Without this rule, 35 of 445
     certain counts of a draw with strong couples were false.
     """
-    FROM, TO, BELOW_FROM, BELOW_TO, ABOVE_FROM, ABOVE_TO, SHARE = map(layout.at, STABLE)
+    FROM, TO, SHARE = map(layout.at, (STABLE[0], STABLE[1], STABLE[-1]))
+    is_stable, stays = make_stays(layout), make_stays(layout, 1.0 if saturates else BEYOND)
 
     @inline
     def will_settle(group, lane, spin, energy_ratio):
         e = SETTLE_MARGIN * energy_ratio
-        low, high = group[FROM + lane], group[TO + lane]
-        under, over = spin < low, spin > high
-        low = group[BELOW_FROM + lane] if under else (group[ABOVE_FROM + lane] if over else low)
-        high = group[BELOW_TO + lane] if under else (group[ABOVE_TO + lane] if over else high)
         reach = np.sqrt(e)
         lowest, highest = spin - reach, spin + reach
-        bounded = (spin > low) & (spin < high)
-        inside = (lowest > low) & (highest < high)
-        if not saturates:
-            inside = inside | ((lowest > BEYOND * group[FROM + lane]) & (highest < BEYOND * group[TO + lane]))
-        if slows:
+        bounded, inside = is_stable(group, lane, spin, spin), stays(group, lane, lowest, highest)
+        if damped:
             share = group[SHARE + lane]
             within = (lowest > share * group[FROM + lane]) & (highest < share * group[TO + lane])
             inside = within | (e == 0.0) if share < 1.0 else inside
         at_rest = (spin == 0.0) & (e == 0.0)
         signed = (lowest > 0.0) | (highest < 0.0) | at_rest
-        followed = may_settle(group, lane, spin, at_rest)
-        return bounded, inside & signed & followed, followed
+        final = may_settle(group, lane, spin, at_rest)
+        return bounded, inside & signed & final, final
 
     return will_settle

@@ -63,7 +63,7 @@ def compiled_path(model: Model) -> Cached:
     step, INTERVAL, wide, lanes = make_step(DOPRI5, extended, len(moving)), layout.at("interval"), full_width(), LANES
 
     @exactly_compiled
-    def follow(group, steps):
+    def integrate(group, steps):
         wide()
         for _ in range(steps):
             for lane in range(lanes):
@@ -73,6 +73,6 @@ def compiled_path(model: Model) -> Cached:
 
     def run(groups, steps):
         for g in prange(len(groups)):
-            follow(groups[g], steps[g])
+            integrate(groups[g], steps[g])
 
     return parallel(run, "(f8[:, ::1], i8[::1])", f"path-{model.key}")

@@ -45,8 +45,8 @@ class RungeKutta(Stepper):
     """Error constant: the phase of the fastest motion in a step at the default tolerance, in units of
     `Model.radians_a_step`.  The error falls with the power `error_order` of it."""
     layer_error: float
-    """Error constant of the start: the relative error of the slip while it goes from zero to the value that friction
-    holds, v' = λ (1 - v).  For short steps h it is |C| (h λ)^order / e, where the stability function is
+    """Error constant of the start: the relative error of the slip while it goes from zero to its
+    quasi-steady value, v' = λ (1 - v).  For short steps h it is |C| (h λ)^order / e, where the stability function is
     R(-z) = exp(-z) + C z^(order + 1) + …; give that at h λ = `LAYER_STEP`, whether or not such a step is stable."""
 
     @property

@@ -33,7 +33,7 @@ def sampled(
     delay: Array | None = None,
     longest_delay: float = 0.0,
 ) -> Array:
-    """Follow trajectories through the instants of a film, shape (cells, instants).
+    """Integrate trajectories through the instants of a film, shape (cells, instants).
 
     Values are NaN after a body lifts off or a run diverges.  For a model without attitude, a gyroscope shows the
     spin, and the heading is the integral of the spin.
@@ -74,7 +74,7 @@ def in_lanes(rows: Array, needed: Array) -> tuple[Array, Array, Array]:
     """
     order = np.argsort(needed, kind="stable")
     groups = -(-len(order) // LANES)
-    # Idle lanes of the last group follow its last cell once more.
+    # Idle lanes of the last group repeat its last cell.
     filled = order[np.minimum(np.arange(groups * LANES), len(order) - 1)]
     steps = needed[filled].reshape(groups, LANES).max(axis=1)
     lanes = rows[:, filled].reshape(len(rows), groups, LANES).transpose(1, 0, 2)
@@ -99,7 +99,7 @@ def compiled_samples(model: Model, what: Seen) -> Cached:
     wide, lanes = full_width(), LANES
 
     @exactly_compiled
-    def follow(group, gaps, shown):
+    def integrate(group, gaps, shown):
         wide()
         for k in range(len(gaps)):
             most = 0.0
@@ -121,7 +121,7 @@ def compiled_samples(model: Model, what: Seen) -> Cached:
 
     def run(groups, gaps, shown):
         for g in prange(len(groups)):
-            follow(groups[g], gaps, shown[g])
+            integrate(groups[g], gaps, shown[g])
 
     return parallel(run, "(f8[:, ::1], f8[::1], f8[:, :, ::1])", f"samples-{what}-{model.key}")
 

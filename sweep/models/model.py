@@ -59,7 +59,7 @@ class Offer(StrEnum):
     FORMULAS = "formulas"
     """Takano's formulas for the critical spins and the number of reversals."""
     ENDING = "ending"
-    """Slow equations that predict how a small rattle ends, also with a couple that slows the spin."""
+    """Slow equations that predict how a small rattle ends, also with a couple that damps the spin."""
     LINEAR = "linear"
     """The spins between which a tiny rattle decays, by the eigenvalues of its Jacobian, at which trajectories may
     settle."""
@@ -118,7 +118,7 @@ class Assumptions:
     conservative: bool = True
     """Whether only friction and couples change the energy above rest, so that it is never larger than at the start."""
     steady_upright: bool = True
-    """Whether a body without rattle can spin upright at a constant rate, apart from couples that slow it."""
+    """Whether a body without rattle can spin upright at a constant rate, apart from couples that damp it."""
 
 
 PLAIN = Assumptions()
@@ -189,7 +189,7 @@ class Model(Tier):
     in steady upright spin n, up to a common factor, by sums and products alone, because n may be a polynomial; by
     default the linear theory takes the Jacobian, which needs several times as long."""
     fastest_motion: Callable[[Columns], Array] | None = None
-    """(columns) -> bound on the rate of the fastest motion that steps have to follow, in sqrt(g/c), shape (cells,); by
+    """(columns) -> bound on the rate of the fastest motion that steps have to resolve, in sqrt(g/c), shape (cells,); by
     default the largest eigenvalue about upright spin."""
     extremes: Callable[[Columns], tuple[Columns, ...]] = lambda columns: (columns,)
     """(columns) -> the columns whose linear motions bound the fastest motion; by default the same ones."""
@@ -242,8 +242,8 @@ class Model(Tier):
     """The origin of a user's model; None for a model of the package."""
 
     @property
-    def slows(self) -> bool:
-        """Whether a couple may slow the spin; it is assumed for a model that a user brings."""
+    def damped(self) -> bool:
+        """Whether a couple may damp the spin; it is assumed for a model that a user brings."""
         return bool(self.variant.couples) if self.variant else bool(self.origin)
 
     @property

@@ -24,7 +24,7 @@ def test_kane_and_levinson_by_the_kernel() -> None:
         at = result.sel(sigma=sigma, omega3=omega3)
         assert at["reversal_times"].item() == pytest.approx(time, abs=0.19)
     assert int(result["reversals"].sel(sigma=1e-4, omega3=5)) == 0
-    assert result.sweep.time_limit.all()  # also with sigma, which slows the spin faster than the rattle
+    assert result.sweep.time_limit.all()  # also with sigma, which damps the spin faster than the rattle
     assert float(result["energy_error"].max()) < 1e-7
 
 

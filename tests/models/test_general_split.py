@@ -45,10 +45,10 @@ def test_they_are_the_equations_of_the_full_model(name: str) -> None:
     full, p = model.constants.of(body), split.model.constants.of(body)
     slopes, (_, power, R, denominator) = model.rhs(y, full)
     z = np.array(split.momentum(y, p))
-    np.testing.assert_allclose(velocities(split.slow, z, p), y, atol=1e-12)
+    np.testing.assert_allclose(velocities(split.nonstiff, z, p), y, atol=1e-12)
     # M' along the full model's motion, by a complex step through the change of variables.
     moved = np.array(split.momentum(y + 1e-30j * np.array(slopes), p)).imag / 1e-30
-    ours, geometry = split.slow(*z, p)
+    ours, geometry = split.nonstiff(*z, p)
     np.testing.assert_allclose(ours, moved[:5], atol=1e-13 * np.abs(moved).max())
     gamma = 1e-10
     v1, v2, num, den = split.newton(*z[[0, 1, 5, 6]], geometry, gamma, y[5], y[6], p)
@@ -70,10 +70,10 @@ def test_newton_leaves_little_of_the_residual(name: str) -> None:
     z, gamma, v = np.array(split.momentum(y, p)), 0.01, y[5:]
 
     def rate(v: np.ndarray) -> np.ndarray:
-        return np.array(model.rhs(velocities(split.slow, np.array([*z[:5], *v]), p), full)[0][5:])
+        return np.array(model.rhs(velocities(split.nonstiff, np.array([*z[:5], *v]), p), full)[0][5:])
 
     base, start = v - gamma * rate(v), v + 1e-6 * np.random.default_rng(5).uniform(-1, 1, v.shape)
-    _, geometry = split.slow(*z[:5], *start, p)
+    _, geometry = split.nonstiff(*z[:5], *start, p)
     end = np.array(split.newton(z[0], z[1], *start, geometry, gamma, *base, p)[:2])
     assert np.abs(end - v).max() < 0.03 * np.abs(start - v).max()
 
@@ -84,7 +84,7 @@ def test_rocking_and_the_matrix_of_the_corrector_against_derivatives(name: str) 
     body = bodies(name) | ({} if name == "slip" else {"Ixz": np.zeros(COUNT), "Iyz": np.zeros(COUNT)})
     split = form_of(find(name))
     p = split.model.constants.of(body)
-    slopes = [split.slow(*(1e-30j * np.eye(7)[i][:, None] * np.ones(COUNT)), p)[0][:4] for i in range(4)]
+    slopes = [split.nonstiff(*(1e-30j * np.eye(7)[i][:, None] * np.ones(COUNT)), p)[0][:4] for i in range(4)]
     J = np.moveaxis(np.array(slopes).imag / 1e-30, 2, 0).swapaxes(1, 2)
     weight = 0.004
     inverse = np.moveaxis(np.array(np.broadcast_arrays(*implicit(weight, split.rocking(p)))).reshape(4, 4, COUNT), 2, 0)

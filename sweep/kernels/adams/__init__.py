@@ -1,1 +1,1 @@
-"""The stiff method: Adams formulas for the slow variables (u, M), BDF for the slip."""
+"""The stiff method: Adams formulas for the nonstiff variables (u, M), BDF for the slip."""

@@ -4,11 +4,11 @@ The step is fixed for each trajectory.  A step takes two evaluations of the deri
 points:
 
 1. Adams-Bashforth predicts (u, M); extrapolation from five points predicts the slip.
-2. At the predicted point, the slow derivatives are evaluated, and one Newton step of BDF5 gives the new slip.
+2. At the predicted point, the nonstiff derivatives are evaluated, and one Newton step of BDF5 gives the new slip.
 3. Adams-Moulton of order nine corrects (u, M).  It is made linearly implicit by the constant matrix
    P = (1 - h w_0 J)⁻¹, where J is the matrix of the rocking about upright rest.  Without P the method would be unstable
    at useful steps.
-4. The slow derivatives are evaluated again, with the new slip, and the same correction is made once more.
+4. The nonstiff derivatives are evaluated again, with the new slip, and the same correction is made once more.
 
 The Adams weights are exact for polynomials, and for cos and sin at the fastest rocking frequency ν and at 3 ν.  The
 third harmonic dominates the error of the plain weights, and fitting it costs nothing in the step.
@@ -105,7 +105,7 @@ class Adams(Stepper):
         return (start_up.compiled_start_up(form_of(model)),)
 
     def model_states(self, model: Model, states: Array, constants) -> Array:
-        return velocities(form_of(model).slow, states, constants)
+        return velocities(form_of(model).nonstiff, states, constants)
 
     def reached(self, table: Table, t_end: float | Array) -> Array:
         reached = table["begin"] + table["done"] * table["step"]
@@ -226,8 +226,8 @@ def _make_work(kernel: Kernel):
 METHOD = Adams(
     name="adams",
     code=1,
-    summary="Adams formulas of orders eight and nine for the slow variables and BDF5 for the slip, for the slip model: "
-    "friction does not limit its step",
+    summary="Adams formulas of orders eight and nine for the nonstiff variables and BDF5 for the slip, for the slip "
+    "model: friction does not limit its step",
     automatic=True,
     # On one thread start-up takes 8 to 11 µs, and a step of dopri5 22 ns.
     step_cost=0.64,

@@ -34,11 +34,11 @@ from sweep.models.stiff.form import STATES, StiffForm
 from sweep.models.stiff.modes import RATTLE, Rattle, fastest_growth
 
 # Largest size of the modes of a rattle that is skipped, which is where a skip ends, and of a rescaled mode.  The second
-# value of each pair is for rattles whose fast mode decays far more quickly than the slow one grows: the ratio of their
-# d Re λ/dn is at least _RATIO.  The limit for a rescaled mode has to be below that for a skip, or a rescaled mode acts
-# on the spin before its factor is taken back.  The error of a skip grows with the fourth power of the size, to 8e-9 in
-# spin at 1e-2 (wide cells with little friction); so for tolerances below _LOOSE all sizes are smaller, by its fourth
-# root.
+# value of each pair is for rattles whose faster mode decays far more quickly than the slower one grows: the ratio of
+# their d Re λ/dn is at least _RATIO.  The limit for a rescaled mode has to be below that for a skip, or a rescaled mode
+# acts on the spin before its factor is taken back.  The error of a skip grows with the fourth power of the size, to
+# 8e-9 in spin at 1e-2 (wide cells with little friction); so for tolerances below _LOOSE all sizes are smaller, by its
+# fourth root.
 _RATIO = 2.6
 _LARGEST, _LARGEST_RESCALED = (3e-3, 1e-2), (1e-3, 3e-3)
 _LOOSE = 1e-7
@@ -390,7 +390,7 @@ def _move_history(table: Table, rattle: Rattle, factors: Array) -> None:
 def _move_powers(form: StiffForm, table: Table, constants: Any) -> None:
     """Set the power of friction at the last points, using the attitude and the normal force of the last state."""
     y = table.columns(STATES).T
-    _, geometry = form.slow(*y, constants)
+    _, geometry = form.nonstiff(*y, constants)
     _, _, numerator, denominator = form.newton(*y[[0, 1, 5, 6]], geometry, 0.0, 0.0, 0.0, constants)
     for j, name in enumerate(POWERS):
         v1, v2 = (table[slip.format((-1 - j) % HISTORY)] for slip in SLIPS)

@@ -1,8 +1,8 @@
 """Start-up of the stiff method: from zero slip, through the initial layer of width 1/μ, to a history of eight points.
 
-The slip does not start at its slow value, the one that follows from the slow variables.  Short steps of dopri5 resolve
-the transition, and leave a first history.  The stiff method goes on from this with plain weights, and doubles its
-step until it reaches the final one.  `LANES` trajectories that need the same number of doublings run side by side.
+The slip does not start at its quasi-steady value, which the nonstiff variables determine.  Short steps of dopri5
+resolve the transition, and leave a first history.  The stiff method goes on from this with plain weights, and doubles
+its step until it reaches the final one.  `LANES` trajectories that need the same number of doublings run side by side.
 Each is computed independently, so their choice does not matter.
 """
 
@@ -65,7 +65,7 @@ def count_levels(slip_decay: Array, step: Array) -> Array:
 
     `slip_decay` is the rate at which the slip decays at first; both it and the result are of shape (cells,).
     """
-    step = np.minimum(step, 1e9)  # a sphere at rest has no motion for a step to follow
+    step = np.minimum(step, 1e9)  # a sphere at rest has no motion for a step to resolve
     return np.maximum(1, np.ceil(np.log2(step * slip_decay / (2 * _SHARE)))).astype(np.int64)
 
 
@@ -160,7 +160,7 @@ def _make_record(form: StiffForm):
     """Compiled (group, points) -> None: makes the first point from states of the full model."""
     load, load_constants, _ = make_access(form.model, layout(form))
     _, put = make_history(_POINT_SIZE)
-    momentum, slow, newton, power = form.momentum, form.slow, form.newton, form.power
+    momentum, nonstiff, newton, power = form.momentum, form.nonstiff, form.newton, form.power
     lanes, wide, power_at = LANES, full_width(), _POWER
 
     @compiled
@@ -169,7 +169,7 @@ def _make_record(form: StiffForm):
         for lane in range(lanes):
             p = load_constants(group, lane)
             s = momentum(load(group, lane), p)
-            f, geometry = slow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)
+            f, geometry = nonstiff(s[0], s[1], s[2], s[3], s[4], s[5], s[6], p)
             _, _, num, den = newton(s[0], s[1], s[5], s[6], geometry, 0.0, 0.0, 0.0, p)
             put(points, 0, lane, f + s[5:])
             points[power_at + lane] = power(num / den, s[5], s[6], geometry, p)

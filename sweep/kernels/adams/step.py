@@ -80,15 +80,15 @@ def make_solve(form: StiffForm):
 
     The slopes returned are those that the corrected states imply, and the power is that of friction.
     """
-    slow, newton, power = form.slow, form.newton, form.power
+    nonstiff, newton, power = form.nonstiff, form.newton, form.power
 
     @inline
     def solve(q, g, e, b, p, weight, per_weight, gamma, P):
-        f, geometry = slow(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
+        f, geometry = nonstiff(q[0], q[1], q[2], q[3], q[4], e[0], e[1], p)
         v0, v1, num, den = newton(q[0], q[1], e[0], e[1], geometry, gamma, b[0], b[1], p)
         _, d = correct(q, g, f, weight, P)
         q = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4])
-        f, geometry = slow(q[0], q[1], q[2], q[3], q[4], v0, v1, p)
+        f, geometry = nonstiff(q[0], q[1], q[2], q[3], q[4], v0, v1, p)
         r, d = correct(q, g, f, weight, P)
         states = (q[0] + d[0], q[1] + d[1], q[2] + d[2], q[3] + d[3], g[4] + weight * f[4], v0, v1)
         slopes = (

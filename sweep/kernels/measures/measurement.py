@@ -136,9 +136,9 @@ class Kind:
     reads: ClassVar[tuple[str, ...]] = ()
     """Names of the states of the model that its hooks read.  Models and methods that lack them cannot have it."""
     every_step: ClassVar[bool] = False
-    """Whether a hook has to follow each step from t = 0: it is then run only by methods that take every step, and
+    """Whether a hook needs each step from t = 0: it is then run only by methods that take every step, and
     `skip` is never called."""
-    settles: ClassVar[bool] = True
+    final_when_settled: ClassVar[bool] = True
     """Whether its values are final once the spin can reverse no more.  If not, runs with it go on to `t_end`, unless
     the configuration sets `stop_early`; its values are then those at `t_stop`."""
     bounds: ClassVar[tuple[int, int] | None] = None

@@ -62,7 +62,7 @@ class RoundOff(Measurement):
         }
 
     def make_check(self, layout: Layout):
-        """Follow the modes from one check to the next, as in `Measurement.make_check`."""
+        """Track the modes from one check to the next, as in `Measurement.make_check`."""
         LOG0, LOG1, DEPTH0, DEPTH1 = map(layout.at, (*_LOGS, *_DEPTHS))
         TRACKED, SPIN, COUNTED, FLAG = map(layout.at, self.quantities[-4:])
         RATE0, RATE1, terms = layout.at("rate0_0"), layout.at("rate1_0"), len(linear.NODES)

@@ -81,4 +81,4 @@ def _full_states(model: Model, table: Table) -> tuple[Array, Any]:
     """States in the full model's variables and constants, of a model with modes in either set of variables."""
     constants = model.constants(*table.columns(constants_of(model)).T)
     states = table.columns(model.states).T
-    return (velocities(form_of(model).slow, states, constants) if model.states == STATES else states), constants
+    return (velocities(form_of(model).nonstiff, states, constants) if model.states == STATES else states), constants

@@ -72,7 +72,7 @@ class Reversals(Measurement):
             phase, half, earlier = group[PHASE + lane] + h, group[HALF + lane], group[EARLIER + lane]
             over = phase - 0.5 * period
             closes = accepted & (over >= 0.0)
-            # The part of the step beyond the end of the half.  The integrand changes slowly, so that its value before
+            # The part of the step beyond the end of the half.  The integrand changes little, so that its value before
             # the step holds for the whole step; half a step is taken off the time of the crossing.
             after = over * steady
             half = half + h * steady
@@ -103,10 +103,10 @@ class Reversals(Measurement):
 
         @inline
         def may_settle(group, lane, spin, at_rest):
-            # If the signs differ, a reversal is still to come: the average over a window has yet to follow the spin
-            # through zero.
-            followed = (spin * group[CLOSED + lane] > 0.0) & (spin * group[CLOSED_SHIFTED + lane] > 0.0)
-            return followed | at_rest
+            # If the signs differ, a reversal is still to come: the spin has gone through zero, and the average over a
+            # window has yet to do so.
+            agree = (spin * group[CLOSED + lane] > 0.0) & (spin * group[CLOSED_SHIFTED + lane] > 0.0)
+            return agree | at_rest
 
         return may_settle
 

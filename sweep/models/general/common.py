@@ -146,10 +146,21 @@ class Variant:
         return specialised(function, **arguments, p=Constants(record._fields, self.known))
 
 
-def offers(scene: Variant, *, dissipates: bool) -> frozenset[Offer]:
-    """A couple that is not linear has no Jacobian that is quadratic in the spin, which the linear theory needs."""
-    linear = dissipates and scene.assumes.isotropic and all(couple.linear for couple in scene.couples)
-    found = {Offer.COUNT: True, Offer.SPIN: True, Offer.ENERGY: scene.assumes.conservative, Offer.LINEAR: linear}
+def offers(scene: Variant) -> frozenset[Offer]:
+    """Return what every model of a scene offers.
+
+    The linear theory needs something that makes a rattle decay, and a Jacobian that is quadratic in the spin: it has
+    none with a couple that is not linear, or with a law that depends on the spin.
+    """
+    isotropic, conservative = scene.assumes.isotropic, scene.assumes.conservative
+    decays = scene.law.coupled is None if scene.law else bool(scene.couples)
+    found = {
+        Offer.COUNT: True,
+        Offer.SPIN: True,
+        Offer.ENERGY: conservative,
+        Offer.LINEAR: decays and isotropic and all(couple.linear for couple in scene.couples),
+        Offer.REVERSAL_TIME: scene.law in (None, VISCOUS) and isotropic and conservative,
+    }
     return frozenset(offer for offer, holds in found.items() if holds)
 
 
@@ -159,14 +170,16 @@ def tilt(y):
     return y[0] * y[0] + y[1] * y[1]
 
 
-def of_any_body(variant: Variant) -> dict[str, Any]:
-    """The fields that the models of a scene have in common."""
+def of_any_body(variant: Variant, states: tuple[str, ...]) -> dict[str, Any]:
+    """The fields that the models of a scene have in common, for a model with these `states`."""
     surface = variant.surface
     return {
         "name": variant.name,
         "variant": variant,
         "assumes": variant.assumes,
+        "states": states,
         "spin_state": 4,
+        "upright": lambda spin: tuple(-spin if name == "omega3" else 0.0 for name in states),
         "tilt": tilt,
         "slower_period": lambda columns: rigid_body.slower_period(columns, surface),
         # x and y are the axes of inertia of a body given by δ, and those of the surface otherwise.

@@ -56,7 +56,7 @@ def energy(y, p):
 
 MODEL = Model(
     name="averaged",
-    summary="slow amplitudes of the two rattles and the spin (Takano 2011, ndotab, abdot)",
+    summary="averaged amplitudes of the two rattles and the spin (Takano 2011, ndotab, abdot)",
     states=("A", "B", "n"),
     spin_state=2,
     parameters=("a", "b", "c", "delta", "mu", "n0", "x0", "y0"),

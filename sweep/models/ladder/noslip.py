@@ -17,7 +17,7 @@ from sweep.models.general.bounds import couples_decay
 from sweep.models.general.common import Variant, of_any_body, offers
 from sweep.models.general.couples import damping_of, friction_of
 from sweep.models.general.rigid_body import about_contact, contact_on, energy_on, gyroscopic
-from sweep.models.model import Array, Model, Offer, Ripple
+from sweep.models.model import Array, Model, Ripple
 from sweep.models.vectors import Vector
 
 STATES = ("u1", "u2", "omega1", "omega2", "omega3")
@@ -49,7 +49,7 @@ def equations(variant: Variant):
 
 def rolling(variant: Variant, parameters: tuple[str, ...]) -> Model:
     """The model of a scene without slip; `parameters` are those of the body and the start."""
-    surface, states, holds = variant.surface, (*STATES, *variant.states), variant.assumes
+    surface, states = variant.surface, (*STATES, *variant.states)
     record, contact, slipping_energy = variant.record(), contact_on(surface), energy_on(surface)
     rippling = ripple.of_velocities(surface, skew=variant.skew)
     rhs = variant.inline(record, equations(variant), y=len(states))
@@ -71,16 +71,13 @@ def rolling(variant: Variant, parameters: tuple[str, ...]) -> Model:
 
     of_slipping, contact_point = rippling.value, variant.inline(record, point, y=len(states))
     return Model(
-        **of_any_body(variant),
+        **of_any_body(variant, states),
         summary="rolling without slip, the limit of infinite friction",
-        states=states,
         parameters=(*parameters, *(each for couple in variant.couples for each in couple.parameters)),
-        offers=offers(variant, dissipates=bool(variant.couples))
-        | ({Offer.REVERSAL_TIME} if holds.isotropic and holds.conservative else set()),
+        offers=offers(variant),
         constants=record,
         start=lambda columns: variant.start(starts.rolling(columns, surface)),
         fastest_decay=lambda columns: couples_decay(variant, columns),
-        upright=lambda spin: tuple(-spin if name == "omega3" else 0.0 for name in states),
         rhs=rhs,
         energy=variant.inline(record, energy, y=len(states)),
         # Nothing damps an error: with 0.07 the energy drifts by a share of 2e-7 in t = 1000, with this by 6e-10.

@@ -121,24 +121,21 @@ def slipping(variant: Variant, parameters: tuple[str, ...]) -> Model:
             "normal_force": R,
         }
 
-    offered, linear = offers(variant, dissipates=law.coupled is None), law.linear_to is None
+    offered, linear = offers(variant), law.linear_to is None
     plain = not (couples or variant.skew or variant.states)
     steady = holds.isotropic and holds.conservative and holds.steady_upright
     ending = law == VISCOUS and steady and all(each.linear and not each.needs_normal_force for each in couples)
     return Model(
-        **of_any_body(variant),
+        **of_any_body(variant, states),
         summary="full equations with slip friction (Takano 2011, Ldot … visf)",
-        states=states,
         parameters=(*parameters, *law.parameters, *(each for couple in couples for each in couple.parameters)),
         offers=offered
-        | ({Offer.REVERSAL_TIME} if law == VISCOUS and holds.isotropic and holds.conservative else set())
         | ({Offer.ENDING} if ending else set())
-        # A couple slows the spin of a body that does not rattle; skips do not allow for that.
+        # A couple damps the spin of a body that does not rattle; skips do not allow for that.
         | ({Offer.MODES} if ending and not couples else set()),
         constants=record,
         start=lambda columns: variant.start(starts.slipping(columns, surface)),
         fastest_decay=fastest_decay,
-        upright=lambda spin: tuple(-spin if name == "omega3" else 0.0 for name in states),
         rhs=rhs,
         characteristic=characteristic if plain and Offer.LINEAR in offered else None,
         energy=variant.inline(record, energy_on(surface), y=len(states)),

@@ -65,7 +65,7 @@ class Ending(NamedTuple):
     overshoot: Array
     """Largest |spin| since the last reversal, or since the beginning."""
     nearest_approach: Array
-    """Smallest |spin| after that.  With a couple, which slows all spins, it is the smallest share that |spin| has in
+    """Smallest |spin| after that.  With a couple, which damps all spins, it is the smallest share that |spin| has in
     the sum of |spin| and of what both modes can still do to it, times the fastest spin within reach."""
 
 
@@ -79,12 +79,12 @@ def estimate(model: Model, columns: Columns, *, check: bool = True) -> Estimate:
     possible = np.flatnonzero(~model.impossible(columns))
     theirs = {name: values[possible] for name, values in columns.items()}
     cells = _prepared(model, stack(model.start(theirs)), model.constants.of(theirs))
-    found, sound = _followed(cells, np.arange(len(cells.which)), _FACTORS[0])
-    slowed = cells.starts[:, 5] > 0
-    counts, sure = found[:, 1], sound & cells.followed & cells.apart & check & ~(slowed & (found[:, -1] > 0))
+    found, sound = _follow(cells, np.arange(len(cells.which)), _FACTORS[0])
+    damped = cells.starts[:, 5] > 0
+    counts, sure = found[:, 1], sound & cells.converged & cells.apart & check & ~(damped & (found[:, -1] > 0))
     for k, factors in enumerate(_FACTORS[1:], 1):
-        some = np.flatnonzero(sure & ((k < _WITHOUT_COUPLE) | slowed))
-        sure[some] = _followed(cells, some, factors)[0][some, 1] == counts[some]
+        some = np.flatnonzero(sure & ((k < _WITHOUT_COUPLE) | damped))
+        sure[some] = _follow(cells, some, factors)[0][some, 1] == counts[some]
     result.reversals[possible[cells.which]], result.sure[possible[cells.which]] = counts, sure
     return result
 
@@ -93,8 +93,8 @@ def ending(model: Model, states: Array, constants: Any) -> Ending:
     """Find how the rattles of trajectories of `model` end, from their states, of shape (states, cells)."""
     result = Ending(*np.full((4, states.shape[1]), np.nan))
     cells = _prepared(model, states, constants)
-    found, sound = _followed(cells, np.arange(len(cells.which)), _FINELY)
-    found[~(sound & cells.followed)] = np.nan
+    found, sound = _follow(cells, np.arange(len(cells.which)), _FINELY)
+    found[~(sound & cells.converged)] = np.nan
     for i, whole in enumerate(result):
         whole[cells.which] = found[:, i] * (1 if i == 1 else cells.reach)
     return result
@@ -111,8 +111,8 @@ class _Cells(NamedTuple):
     """Coefficients, shape (cells, 5, TERMS)."""
     starts: Array
     """As `make_follow` takes them, shape (cells, 8)."""
-    followed: Array
-    """Whether the modes could be followed to all spins."""
+    converged: Array
+    """Whether the modes were found at all spins."""
     apart: Array
     """Whether the modes are as assumed: slip decays fast, and no harmonic of the slower mode meets the faster one."""
 
@@ -128,16 +128,16 @@ def _prepared(model: Model, states: Array, p: Any) -> _Cells:
     E = reach[:, None, None] * modes.of_unit_energy()[body[some]]
     rows = np.concatenate([stack((*p, -states[model.spin_state] / reach, reach)), states[list(RATTLE)]])
     sums, starts = np.empty((len(some), 6, TERMS), complex), np.empty((len(some), 8))
-    followed = np.empty(len(some), bool)
-    compiled_exchange(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), sums, starts, followed)
+    converged = np.empty(len(some), bool)
+    compiled_exchange(model)(np.ascontiguousarray(rows.T), E, np.linalg.inv(E), sums, starts, converged)
     tables, starts[:, 6:] = coefficients(sums)
     slower, faster = rates[:, :2].imag.T
     # Slip that decays more slowly than the faster mode turns acts on its own.
     apart = (3 * slower > (1 + _BELOW_THREE) * faster) & (rates[:, 4:].real < -faster[:, None]).all(axis=1)
-    return _Cells(some, reach, tables, starts, followed, apart)
+    return _Cells(some, reach, tables, starts, converged, apart)
 
 
-def _followed(cells: _Cells, some: Array, factors: Array) -> tuple[Array, Array]:
+def _follow(cells: _Cells, some: Array, factors: Array) -> tuple[Array, Array]:
     """Follow `some` of the cells; return what `make_follow` finds, over all cells."""
     found, sound = np.empty((len(cells.which), len(FOUND))), np.empty(len(cells.which), bool)
     compiled_follow()(cells.tables, cells.starts, some, factors, found, sound)
@@ -155,15 +155,15 @@ def _modes_at_rest(model: Model, p: Any) -> tuple[Modes, Array]:
 
 @cache
 def compiled_exchange(model: Model) -> Cached:
-    """Compiled (rows, E, E⁻¹, sums, starts, followed) -> None: finds the terms of each cell, and where it starts.
+    """Compiled (rows, E, E⁻¹, sums, starts, converged) -> None: finds the terms of each cell, and where it starts.
 
-    A row has the constants, the spin, the reach and the rattle; `followed` is as of `make_exchange`.
+    A row has the constants, the spin, the reach and the rattle; `converged` is as of `make_exchange`.
     """
     record, n = model.constants, len(model.constants._fields)
     load = compile_inline("load", "row", [f"return Of{tuple_of(f'row[{i}]' for i in range(n))}"], {"Of": record})
     exchange, begin = make_exchange(model)
 
-    def run(rows, E, inverse, sums, starts, followed):
+    def run(rows, E, inverse, sums, starts, converged):
         for i in range(len(rows)):
             body = Body(load(rows[i]), rows[i, n + 1])
             d, at_nodes = exchange(body, E[i], inverse[i], sums[i])
@@ -171,7 +171,7 @@ def compiled_exchange(model: Model) -> Cached:
             start = (a1.real, a1.imag, a2.real, a2.imag, spin, d)
             for k in range(6):
                 starts[i, k] = start[k]
-            followed[i] = at_nodes and at_start
+            converged[i] = at_nodes and at_start
 
     types = "(f8[:, ::1], c16[:, :, ::1], c16[:, :, ::1], c16[:, :, ::1], f8[:, ::1], b1[::1])"
     return serial(run, types, f"exchange-{model.key}")

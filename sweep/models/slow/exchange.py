@@ -20,8 +20,8 @@ T and Q are fitted to the full equations at 48 points, which differ in the phase
 amplitude that a trajectory reaches, so that they hold the mean effect of higher orders there.  How they change with the
 energy is measured at rest: T and Q are divided by 1 + κ |a|², with one κ for each.
 
-A couple adds -d n to n', where d does not depend on the spin.  C and the ripple then follow the spin as if it stood
-still, which leaves out terms of the order of d in units of a frequency.
+A couple adds -d n to n', where d does not depend on the spin.  C and the ripple are those of a spin that stands still,
+which leaves out terms of the order of d in units of a frequency.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ def _along_modes(inverse, parts, result):
 
 
 @called
-def _follow_modes(A, Y, C):
+def _separate_modes(A, Y, C):
     """Find Y, of shape (4, 2), and C for the Jacobian A in the modes at rest; return whether the iteration converged.
 
     It converges where A is nearly diagonal.
@@ -243,7 +243,7 @@ and (1 + Y) C, and the ripple q."""
 
 
 def _make_equations(model: Model):
-    """Compiled functions that evaluate the equations of a model near upright spin: `slowed`, `jacobian`, `evaluate`."""
+    """Compiled functions that evaluate the equations near upright spin: `damping`, `jacobian` and `evaluate`."""
     rhs, couples = model.rhs, bool(model.variant and model.variant.couples)
 
     @called
@@ -256,7 +256,7 @@ def _make_equations(model: Model):
             slopes[6, i] = turn / body.reach
 
     @called
-    def slowed(n, body):
+    def damping(n, body):
         """Return ω3' in upright spin, by couples alone."""
         rates, _ = rhs((0.0, 0.0, 0.0, 0.0, -n * body.reach, 0.0, 0.0), body.p)
         return rates[4] / body.reach if couples else 0.0
@@ -282,7 +282,7 @@ def _make_equations(model: Model):
         `shape` is E (1 + Y + w) by states, or without w, of shape (6, 2).  The sums are real and imaginary parts in
         turn.
         """
-        points, drag = _POINTS[level], slowed(n, body)
+        points, drag = _POINTS[level], damping(n, body)
         x, slopes = np.empty((7, points)), np.empty((7, points))
         for i in range(6):
             _superpose(shape[i], _WAVES[level], x[i])
@@ -294,7 +294,7 @@ def _make_equations(model: Model):
             slopes[6, i] -= drag
         _combine(slopes[6], _OF_SPIN[level], of_spin)
 
-    return slowed, jacobian, evaluate
+    return damping, jacobian, evaluate
 
 
 def _make_linear_terms(evaluate):
@@ -383,7 +383,7 @@ def coefficients(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     table[:, :, :LOWEST] = through_nodes(at_nodes[:, :, :LOWEST])
     for k, terms in enumerate((slice(LOWEST, HIGHER), slice(HIGHER, TERMS))):
         usual, larger = ((np.abs(each[:, terms]) ** 2).sum(axis=1) for each in (sums[:, 0], large))
-        with np.errstate(all="ignore"):  # the modes could not be followed
+        with np.errstate(all="ignore"):  # the modes were not found
             ratio = np.sqrt(usual / larger)
             bent[:, k] = (ratio - 1) / (_SIZES[_LARGE] ** 2 - ratio * _SIZES[_USUAL] ** 2)
         straight = 1 + bent[:, k] * _SIZES[_USUAL] ** 2
@@ -392,13 +392,13 @@ def coefficients(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def make_exchange(model: Model):
-    """Compiled (body, E, E⁻¹, sums) -> (d, followed), which finds the terms of a body, and `begin`.
+    """Compiled (body, E, E⁻¹, sums) -> (d, converged), which finds the terms of a body, and `begin`.
 
     E is in units of `reach`.  `sums`, of shape (6, TERMS), gets the terms at the five `NODES`, but T and Q only at
-    three; and as a last row those at rest with T and Q at a large amplitude.  `followed` says whether the modes could
-    be followed to all spins.
+    three; and as a last row those at rest with T and Q at a large amplitude.  `converged` says whether the modes were
+    found at all spins.
     """
-    slowed, jacobian, evaluate = _make_equations(model)
+    damping, jacobian, evaluate = _make_equations(model)
     linear_terms, (find_shape, resonances) = _make_linear_terms(evaluate), _make_higher_terms(evaluate)
 
     @called
@@ -406,10 +406,10 @@ def make_exchange(model: Model):
         A, C, Y = np.empty((5, 6, 6), E.dtype), np.empty((5, 2, 2), E.dtype), np.empty((5, 4, 2), E.dtype)
         slope, q = np.empty((4, 2), E.dtype), np.empty(3, E.dtype)
         small, linear, shape = np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), np.empty((6, 12), E.dtype)
-        followed = True
+        converged = True
         for k in range(5):
             jacobian(NODES[k], body, E, inverse, A[k])
-            followed &= _follow_modes(A[k], Y[k], C[k])
+            converged &= _separate_modes(A[k], Y[k], C[k])
         for k in range(5):
             at = At(NODES[k], A[k], C[k], Y[k], slope, small, linear, q)
             linear_terms(at, body, E, sums[k])
@@ -425,11 +425,11 @@ def make_exchange(model: Model):
                 for m in range(LOWEST):
                     sums[5, m] = sums[0, m]
                 resonances(_LARGE, at, body, inverse, shape, sums[5])
-        return slowed(1.0, body), followed
+        return damping(1.0, body), converged
 
     @called
     def begin(x, n, body, E, inverse):
-        """Return the amplitudes a of a rattle x, the spin without the ripple, and `followed` at a spin n."""
+        """Return the amplitudes a of a rattle x, the spin without the ripple, and `converged` at a spin n."""
         A, C, Y, q = (
             np.empty((6, 6), E.dtype),
             np.empty((2, 2), E.dtype),
@@ -437,7 +437,7 @@ def make_exchange(model: Model):
             np.empty(3, E.dtype),
         )
         jacobian(n, body, E, inverse, A)
-        followed = _follow_modes(A, Y, C)
+        converged = _separate_modes(A, Y, C)
         z1, z2 = 0.0j, 0.0j
         for k in range(6):
             z1, z2 = z1 + inverse[0, k] * x[k], z2 + inverse[1, k] * x[k]
@@ -446,6 +446,6 @@ def make_exchange(model: Model):
             a1, a2 = z1 - np.conj(Y[0, 0] * a1 + Y[0, 1] * a2), z2 - np.conj(Y[1, 0] * a1 + Y[1, 1] * a2)
         at = At(n, A, C, Y, Y, np.empty((6, 2), E.dtype), np.empty((6, 2), E.dtype), q)
         linear_terms(at, body, E, np.empty(LOWEST, E.dtype))
-        return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real, followed
+        return a1, a2, n + 2.0 * (q[0] * a1 * a1 + q[1] * a1 * a2 + q[2] * a2 * a2).real, converged
 
     return exchange, begin

@@ -41,8 +41,8 @@ _APART_STEP = 3.0
 
 # It is over when both modes decay and can change the spin by no more than this share.  With a couple, the spin is a sum
 # of decaying terms, its own and one of each mode: it is over when the slowest exceeds the others that much.  A couple
-# slows the spin by no more than a share `_SLOWED` in a step.  There may be more steps if they are shorter than usual.
-_OVER, _MOST_STEPS, _SLOWED = 1e-3, 3000, 0.1
+# damps the spin by no more than a share `_DAMPED` in a step.  There may be more steps if they are shorter than usual.
+_OVER, _MOST_STEPS, _DAMPED = 1e-3, 3000, 0.1
 
 # The equations have failed if the spin exceeds what the energy allows by this factor.
 _FAR = 3.0
@@ -284,7 +284,7 @@ def _tracked(at, acts, reverses):
 def _course(at, now, acts, spin, far, reverses):
     """Return the state, the spin that would remain, and overshoot and nearest approach after a check at a spin.
 
-    With a couple, which slows all spins, the nearest approach is the smallest share that |spin| has in the sum of
+    With a couple, which damps all spins, the nearest approach is the smallest share that |spin| has in the sum of
     |spin| and of what both modes can still do to it.
     """
     r1, r2, turn1, turn2 = now.rate1.real, now.rate2.real, acts.h1 * acts.f1, acts.h2 * acts.f2
@@ -313,7 +313,7 @@ def _longest(at, now, acts, pace):
     way = pace * _TURN * (np.sqrt(f1) + np.sqrt(f2) + min(abs(r1), abs(r2)) / max(h1, h2, _TINY))
     step = min(_until(way, h1 * f1, r1), _until(way, h2 * f2, r2))
     step = min(step, _until(way, acts.cross / (1.0 + acts.apart * step), 0.5 * (r1 + r2)))
-    step = min(step, pace * _CHANGE / (max(h1, h2) * min(way, left) + _TINY), pace * _SLOWED / (at.d + _TINY))
+    step = min(step, pace * _CHANGE / (max(h1, h2) * min(way, left) + _TINY), pace * _DAMPED / (at.d + _TINY))
     mixed = 2.0 * at.strong * np.sqrt(f1 * f2)
     return min(step, pace * _BEAT / (acts.apart + mixed)) if mixed > _ACTS * acts.apart else step
 

@@ -20,7 +20,7 @@ STATES = ("u1", "u2", "M1", "M2", "M3", "v1", "v2")
 
 
 Geometry = namedtuple("Geometry", "u3 x y z t1 t2 v3 w1 w2 w3 du1 du2 du3 s1 s2 s3 q1 q2 q3")
-"""Intermediate results of `slow` that `newton` needs as well; components along the axes of the states.
+"""Intermediate results of `nonstiff` that `newton` needs as well; components along the axes of the states.
 
 They belong to u; the contact point x_p = (x, y, z); t = u/u3, so that v3 = -(t1 v1 + t2 v2); v_p; ω; u'; s = v_0 -
 x_p'; and q = u × x_p.
@@ -37,7 +37,7 @@ class StiffForm:
     """The same model in these variables; it has the same constants p."""
     momentum: Callable[..., Any]
     """Inline, (states of `full`, p) -> states."""
-    slow: Callable[..., Any]
+    nonstiff: Callable[..., Any]
     """Inline, (states one by one, p) -> ((u1', u2', M1', M2', M3'), geometry), where `newton` needs the latter."""
     newton: Callable[..., Any]
     """Inline, (u1, u2, v1, v2, geometry, γ, b1, b2, p) -> (v1, v2, numerator and denominator of the normal force R at
@@ -56,7 +56,7 @@ class StiffForm:
     """(columns) -> bound on the rate at which couples damp the angular velocity, shape (cells,)."""
 
 
-def in_momentum(full: Model, momentum, slow, ripple: Ripple) -> Model:
+def in_momentum(full: Model, momentum, nonstiff, ripple: Ripple) -> Model:
     """The model `full` in the variables `STATES`, without the functions that take its own states.
 
     The other arguments are those of `StiffForm` and `Model`.
@@ -68,12 +68,12 @@ def in_momentum(full: Model, momentum, slow, ripple: Ripple) -> Model:
         return states
 
     def observe(y, p):
-        return full.observe(velocities(slow, y, p), p)
+        return full.observe(velocities(nonstiff, y, p), p)
 
     @inline
     def energy(y, p):
         u1, u2, M1, M2, M3, v1, v2 = y
-        _, geometry = slow(u1, u2, M1, M2, M3, v1, v2, p)
+        _, geometry = nonstiff(u1, u2, M1, M2, M3, v1, v2, p)
         return full_energy((u1, u2, geometry.w1, geometry.w2, geometry.w3, v1, v2), p)
 
     return replace(
@@ -84,10 +84,10 @@ def in_momentum(full: Model, momentum, slow, ripple: Ripple) -> Model:
 
 def no_rhs(y, p):
     """Stand in for the right-hand side, which a model in `STATES` does not have."""
-    raise NotImplementedError("a stiff method takes `slow` and `newton`, not a right-hand side")
+    raise NotImplementedError("a stiff method takes `nonstiff` and `newton`, not a right-hand side")
 
 
-def velocities(slow, y: Array, p) -> Array:
+def velocities(nonstiff, y: Array, p) -> Array:
     """The states of the full model, shape (7, cells), from the `STATES` y: the inverse of `StiffForm.momentum`."""
-    _, geometry = slow(*y, p)
+    _, geometry = nonstiff(*y, p)
     return np.stack(np.broadcast_arrays(y[0], y[1], geometry.w1, geometry.w2, geometry.w3, y[5], y[6]))

@@ -130,8 +130,8 @@ def rocks(form: StiffForm, modes: Modes) -> Array:
 
 
 def _equations(form: StiffForm) -> Equations:
-    slow, small = form.slow, _WITH_COUPLES if form.full.variant.couples else _SMALL
-    return Equations(form.model.energy, lambda y, p: slow(*y, p)[0][4], form.model.spin_state, small)
+    nonstiff, small = form.nonstiff, _WITH_COUPLES if form.full.variant.couples else _SMALL
+    return Equations(form.model.energy, lambda y, p: nonstiff(*y, p)[0][4], form.model.spin_state, small)
 
 
 def _with_conjugates(amplitudes: Array) -> Array:

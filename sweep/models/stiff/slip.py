@@ -39,8 +39,8 @@ def has_form(model: Model) -> bool:
     """Return whether a model has a stiff form: slip models do, users' models do not.
 
     The law has to be viscous.  A step that may be long compared with the decay of the slip is of use only where the
-    slip remains at the value that follows from the slow motion.  With the other laws slip begins and ends within times
-    that dopri5 resolves anyway.  The plane has to be isotropic and the scene conservative: these equations hold for
+    slip remains at its quasi-steady value.  With the other laws slip begins and ends within times that dopri5 resolves
+    anyway.  The plane has to be isotropic and the scene conservative: these equations hold for
     gravity along the normal and for no other force.
     """
     of = model.variant
@@ -67,7 +67,7 @@ def _form_of(scene: Variant) -> StiffForm:
         v_g = Vector(v1, v2, -(v1 * u1 + v2 * u2) * inv_u3) + x_p.cross(w)
         return u1, u2, *(rigid_body.momentum(w, p) - x_p.cross(v_g)), v1, v2
 
-    def slow(u1, u2, M1, M2, M3, v1, v2, p):
+    def nonstiff(u1, u2, M1, M2, M3, v1, v2, p):
         c3 = 1.0 - (u1 * u1 + u2 * u2)
         u, M = Vector(u1, u2, -np.sqrt(c3)), Vector(M1, M2, M3)
         a, rho, square = surface.point(u, c3, p)
@@ -122,12 +122,12 @@ def _form_of(scene: Variant) -> StiffForm:
 
     number = dict.fromkeys
     momentum = scene.inline(record, momentum, y=7)
-    slow = scene.inline(record, slow, **number(("u1", "u2", "M1", "M2", "M3", "v1", "v2")))
+    nonstiff = scene.inline(record, nonstiff, **number(("u1", "u2", "M1", "M2", "M3", "v1", "v2")))
     return StiffForm(
         full=full,
-        model=in_momentum(full, momentum, slow, ripple.of_momenta(surface, skew=scene.skew)),
+        model=in_momentum(full, momentum, nonstiff, ripple.of_momenta(surface, skew=scene.skew)),
         momentum=momentum,
-        slow=slow,
+        nonstiff=nonstiff,
         newton=scene.inline(
             record, newton, **number(("u1", "u2", "v1", "v2")), geometry=Geometry, **number(("gamma", "b1", "b2"))
         ),

@@ -101,7 +101,7 @@ def rocking_rates(model: Model, constants, spin: Array) -> Array:
 def fastest_motion(model: Model, columns: Columns) -> Array:
     """Largest |λ| of the rattle at the fastest spins within reach, leaving out the fast decay due to friction.
 
-    This is the motion that an integrator has to follow, in sqrt(g/c), shape (cells,); 0 where nothing moves.  A model
+    This is the motion that an integrator has to resolve, in sqrt(g/c), shape (cells,); 0 where nothing moves.  A model
     may define it itself.
     """
     if model.fastest_motion:

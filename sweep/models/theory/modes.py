@@ -59,9 +59,9 @@ class Modes:
     @cached_property
     def turns(self) -> Array:
         """s' for the same rattle, averaged over a period, and without the effect of couples, shape (cells, 2)."""
-        turns, slowed = np.zeros((2, len(self.upright))), self._turn(0 * self._quarters[0])
+        turns, by_couples = np.zeros((2, len(self.upright))), self._turn(0 * self._quarters[0])
         for part in self._quarters:
-            turns += 2 * (self._turn(part) - slowed) / self.equations.small**2
+            turns += 2 * (self._turn(part) - by_couples) / self.equations.small**2
         return turns.T
 
     @cached_property

@@ -2,7 +2,7 @@
 
 A rattle makes the spin ripple at twice the frequencies of its two modes, and at their sum and difference.  Without
 slip, at n = 0 and to second order in the rattle, this ripple is the bilinear form K of u and of the angular momentum M
-about the contact point.  What is left in n* is the slow change of the spin that the paper describes (ndotab).
+about the contact point.  What is left in n* is the mean change of the spin that the paper describes (ndotab).
 
 The contact force has no torque about the contact point, so that to second order, with J_i = I_i + c² and
 ω_i = M_i / J_i,
@@ -37,7 +37,8 @@ from sweep.models.theory.rocking import Rocking
 FORM = ("K11", "K12", "K21", "K22")
 
 _APART = 1e-9
-"""Share by which the squares of two frequencies have to differ: the ripple at their difference is slow otherwise."""
+"""Share by which the squares of two frequencies have to differ: otherwise the spin is not averaged over the ripple at
+their difference."""
 
 
 def for_each_body(of: Callable[[Columns], tuple[Array, ...]], columns: Columns) -> tuple[Array, ...]:

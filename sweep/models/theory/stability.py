@@ -36,7 +36,7 @@ SPIN_LIMIT = 10.0
 """Largest |spin| examined, in sqrt(g/c), fifty times the spin that a hand gives: upright spin that is stable up to
 this limit is taken as stable at any spin."""
 
-_SLOW_SPIN = 1e-8
+_NEAR_REST = 1e-8
 """A spin at which couples are as at rest, in sqrt(g/c)."""
 
 _MARGIN = 1.5
@@ -75,7 +75,7 @@ class StableRanges(NamedTuple):
     above_low: Array
     above_high: Array
     share: Array
-    """The share of the range about zero in which the rattle decays faster than a couple slows the spin."""
+    """The share of the range about zero in which the rattle decays faster than a couple damps the spin."""
 
     @classmethod
     def none(cls, cells: int) -> StableRanges:
@@ -120,17 +120,17 @@ def stable_ranges(model: Model, columns: Columns) -> StableRanges:
 
 
 def _share_within(model: Model, constants, unit: Array, decay: Array) -> Array:
-    """Return the share of the range about zero within which the rattle decays faster than a couple slows the spin.
+    """Return the share of the range about zero within which the rattle decays faster than a couple damps the spin.
 
     By the averaged equations (ndotab, abdot), a mode of energy I3 e/2 changes as e' = -2 s (n_c - n) e, and the spin as
     n' = -s e - r n, where r is its decay rate by the couple.  Then q = sqrt(e)/n obeys q'/q = r - s n_c + s n (1 + q²).
     So sqrt(e) falls for ever faster than n, and cannot turn it, if n (1 + q²) < n_c (1 - r/(s n_c)), where s n_c is the
     `decay` rate of the rattle at rest.  The share is 1 without a couple.
     """
-    upright = tuple(stack(model.upright(_SLOW_SPIN * unit)))
+    upright = tuple(stack(model.upright(_NEAR_REST * unit)))
     slopes, _ = model.rhs(upright, constants)
-    slowing = -slopes[model.spin_state] / upright[model.spin_state]
-    return np.asarray(np.where(slowing > 0, np.clip(1 - _MARGIN * slowing / decay, 0.0, 1.0), 1.0))
+    damping = -slopes[model.spin_state] / upright[model.spin_state]
+    return np.asarray(np.where(damping > 0, np.clip(1 - _MARGIN * damping / decay, 0.0, 1.0), 1.0))
 
 
 def _is_steady(model: Model, constants, spin: Array) -> Array:
