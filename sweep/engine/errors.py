@@ -29,7 +29,7 @@ import numpy as np
 from sweep.engine.cells import Cells
 from sweep.engine.plan import TOLERANCE_TIME
 from sweep.grid import Array
-from sweep.kernels.measures.margin import Margin, last_arc, margins
+from sweep.kernels.measures.margin import EXTREMES, Margin, last_arc, margins
 from sweep.kernels.measures.noise import RoundOff
 from sweep.kernels.measures.resting_spin import endings, ends_as_predicted, only
 from sweep.kernels.measures.reversals import Reversals
@@ -138,7 +138,7 @@ def _of_counts(first: Cells, second: Cells, left: Ending, larger: Array) -> tupl
     theirs = last_arc(second.table, endings(second.table, predicted))
     # Round-off does not shrink with the step.
     larger = np.where(limited_by_round_off(first), np.fmin(larger, 1.0), larger)
-    overshoot, nearest = (np.abs(one - another) / larger for one, another in zip(ours[1:], theirs[1:], strict=True))
+    overshoot, nearest = (np.abs(getattr(ours, name) - getattr(theirs, name)) / larger for name in EXTREMES)
     both, more, fewer = np.fmax(overshoot, nearest), *margins(first.table, left)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = (nearest if first.model.damped else both) / more

@@ -12,7 +12,6 @@ For a trajectory that settles, the slow equations give the further course of its
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 
@@ -100,27 +99,18 @@ def margins(table: Table, left: Ending) -> tuple[Array, Array]:
     return more, np.where(table["reversals"] > 0, arc.overshoot, np.nan)
 
 
-class LastArc(NamedTuple):
-    """The last arcs of averaged spins, arrays of shape (cells,)."""
-
-    reversals: Array
-    """Number of reversals before it."""
-    overshoot: Array
-    nearest_approach: Array
-
-
-def last_arc(table: Table, left: Ending) -> LastArc:
+def last_arc(table: Table, left: Ending) -> Ending:
     """Find the last arcs of the spins: as recorded, and as the slow equations continue them, which is what is `left`.
 
-    Where these do not apply, the spin hardly changes any more.
+    Where these do not apply, the spin hardly changes any more.  The reversals are all those of the trajectory.
     """
     unknown = np.full(len(table.rows), np.nan)
     overshoot, nearest = (table[name] if name in table.layout else unknown for name in EXTREMES)
     further = (left.reversals > 0) | (left.overshoot > overshoot)
-    return LastArc(
-        table["reversals"] + np.nan_to_num(left.reversals),
-        np.where(further, left.overshoot, overshoot),
-        np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach)),
+    return left._replace(
+        reversals=table["reversals"] + np.nan_to_num(left.reversals),
+        overshoot=np.where(further, left.overshoot, overshoot),
+        nearest_approach=np.where(further, left.nearest_approach, np.fmin(nearest, left.nearest_approach)),
     )
 
 
