@@ -9,8 +9,9 @@ import numpy as np
 
 from sweep.config import Config
 from sweep.engine import limits
+from sweep.engine.cells import Choice
 from sweep.engine.executor import nominal_seconds
-from sweep.engine.plan import Choice, choose, kernels
+from sweep.engine.plan import choose, kernels
 from sweep.faults import duration
 from sweep.grid import Array
 from sweep.kernels.build import compile_seconds, missing

@@ -21,10 +21,12 @@ from sweep.models.model import Array, Columns, Model, Offer, Ripple
 from sweep.models.theory.coefficients import coefficients, normal_coordinates
 from sweep.models.theory.ripple import FORM, ripple_of_states
 
-_CONSTANTS = "rate1_squared rate2_squared k1 k2 k3 k4 m1 m2 m3 m4 nu1_squared nu2_squared root_J slip gravity I3"
+_Constants = namedtuple(
+    "_Constants", "rate1_squared rate2_squared k1 k2 k3 k4 m1 m2 m3 m4 nu1_squared nu2_squared root_J slip gravity I3"
+)
 
 
-class Constants(namedtuple("Constants", _CONSTANTS)):  # type: ignore[misc]
+class Constants(_Constants):
     """The paper's coefficients, for the body scaled to c = 1, but with time as in the states.
 
     `rate1_squared` is ν1²/c, the square of the frequency with time as in the states; `root_J` is sqrt(J1 J2), `slip` is
