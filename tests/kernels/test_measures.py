@@ -18,7 +18,7 @@ from sweep.results.dataset import SERIES, VARIABLES
 
 class Slid(Measurement):
     name, summary, asks = "slid", "distance along v1", Offer.SPIN
-    reads, every_step, settles = ("v1",), True, False
+    reads, every_step, final_when_settled = ("v1",), True, False
 
 
 @pytest.fixture(autouse=True)
