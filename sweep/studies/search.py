@@ -135,7 +135,9 @@ def found(problem: Problem, note: Note) -> tuple[Problem, list[Minimum]]:
             break
     problem, minima = min(tried, key=lambda each: each[1][0].misfit)
     if verdict.judged(problem, minima[0]).fits:
+        # Slopes at the ends of ranges are exact only now: by rough ones, a range was not widened that is too narrow.
         minima = _minimised(problem, [each.place for each in minima], enough=ENOUGH)
+        problem, minima = settled(problem, minima, note, ENOUGH)
     return problem, _different(turned(problem, minima))
 
 
@@ -187,7 +189,9 @@ def _minimised(
     return _different(run_concurrently(searches, answers))
 
 
-def settled(problem: Problem, minima: list[Minimum], note: Note) -> tuple[Problem, list[Minimum]]:
+def settled(
+    problem: Problem, minima: list[Minimum], note: Note, enough: float = _ROUGHLY
+) -> tuple[Problem, list[Minimum]]:
     """Return the minima after leaving out outliers and widening ranges at whose ends the best minimum lies."""
     for _ in range(_ROUNDS):
         best = minima[0]
@@ -203,7 +207,7 @@ def settled(problem: Problem, minima: list[Minimum], note: Note) -> tuple[Proble
         if wider := [name for name in free if free[name] != problem.free[name]]:
             note(f"wider ranges: {', '.join(wider)}")
         new = replace(problem, free=free, kept=kept, scale=scale, _steps={})
-        minima = _minimised(new, [new.place(problem.values(each.place)) for each in minima])
+        minima = _minimised(new, [new.place(problem.values(each.place)) for each in minima], enough=enough)
         problem = new
     return problem, minima
 

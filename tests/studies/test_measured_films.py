@@ -56,6 +56,16 @@ def test_intervals_with_errors_of_the_ruler_hold_the_friction() -> None:
     assert np.median(widths) <= 5
 
 
+@pytest.mark.release
+def test_a_range_is_widened_once_slopes_at_its_ends_are_exact() -> None:
+    """A film of seed 278952100, whose start lies beyond the first range of x0; it was refused for that."""
+    random = np.random.default_rng([278952100, 0, 16])
+    one = next(islice(filter(None, iter(lambda: films.made(random), 0)), 1))
+    found = sweep.fit(one.scene(), one.film, films.FREE, progress=False)
+    assert found.attrs["fits"] == 1
+    assert found.sel(parameter="x0").range_to.item() > 0.02
+
+
 def spoilt(one: films.Filmed, kind: str, random: np.random.Generator) -> tuple[dict[str, object], Film, str]:
     """A configuration and a film, one of which is wrong, and what names the change."""
     film, scene = one.film, one.scene()
