@@ -9,6 +9,10 @@ import pytest
 from support import ROOT
 from support.processes import python
 
+from sweep.faults import CompileError
+from sweep.kernels.layout import Layout
+from sweep.kernels.measures.measurement import Measurement
+
 # The averaged model: its kernel compiles fastest.
 SCRIPT = """
 import sys
@@ -105,3 +109,11 @@ def test_a_typo_in_a_hook_is_named_in_two_lines(
     said = python(*scene, "--output", tmp_path, folder=copy, code=1, NUMBA_CACHE_DIR="").stderr.splitlines()
     assert len(said) == 2
     assert re.match(f"{re.escape(str(margin))}:{line}: {words}", said[0]), said
+
+
+def test_a_misspelt_hook_is_refused() -> None:
+    """It would never be called, and its quantity would stay zero."""
+    with pytest.raises(CompileError, match=r":\d+: .*Own.make_stp is not a hook \(did you mean make_step\?\)"):
+
+        class Own(Measurement):
+            def make_stp(self, layout: Layout, at_reversal: object) -> None: ...

@@ -35,8 +35,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import FunctionType
 from typing import ClassVar, NamedTuple
 
+from sweep.faults import CompileError, suggestion
 from sweep.kernels.layout import Layout, Table
 from sweep.models.model import Array, Columns, Model, Offer
 from sweep.models.slow.estimate import Ending
@@ -181,6 +183,14 @@ class Measurement(Kind):
     """Whether it needs the work of friction in each step, which is computed only on request."""
     ripple: ClassVar[bool] = False
     """Whether it needs the ripple-free spin in each step, likewise."""
+
+    def __init_subclass__(cls) -> None:
+        """Refuse a misspelt hook, which would never be called: functions of a measurement's own begin with "_"."""
+        for name, value in vars(cls).items():
+            if isinstance(value, FunctionType) and not name.startswith("_") and not hasattr(Measurement, name):
+                code, hooks = value.__code__, [each for each in vars(Measurement) if not each.startswith("_")]
+                reason = f"{cls.__name__}.{name} is not a hook{suggestion(name, hooks)}; one of its own begins with _"
+                raise CompileError([(code.co_filename, code.co_firstlineno)], reason)
 
     @property
     def quantities(self) -> tuple[str, ...]:
