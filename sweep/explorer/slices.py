@@ -118,8 +118,12 @@ class Source:
         return labels.label(self.cell, name) if name in self.cell.variables else self.words(name)
 
     def map(self, name: str, x: str, y: str, at: Mapping[str, int]) -> Map:
-        """Read the map of a variable over `x` and `y`, at an index of each other axis; a row if `y` is empty."""
-        chosen = {*self.dims, *self.dims_of(name)} - {x, y}
+        """Read the map of a variable over `x` and `y`, at an index of each other axis; a row if `y` is empty.
+
+        A derived quantity keeps all cells along the axes that it does not have: it is derived from them together.
+        """
+        own = self.dims_of(name)
+        chosen = (own if of(name).derive else {*self.dims, *own}) - {x, y}
         part = self.dataset.isel({d: at.get(d, 0) for d in chosen})
         return describe(part, name, x, y)
 
@@ -142,10 +146,14 @@ class Source:
         return {name: float(known.isel({d: index.get(str(d), 0) for d in known.dims})) for name, known in there.items()}
 
     def values_at(self, index: Mapping[str, int]) -> dict[str, str]:
-        """All values of the cell at `index`: each variable in words, and its value with its unit."""
+        """All values of the cell at `index`: each variable in words, and its value with its unit.
+
+        Without those that are derived from several cells.
+        """
         cell = quantities.with_derived(self.dataset.isel({d: index.get(d, 0) for d in self.dims}).load())
-        values = {self.words(n): self._value(cell, n) for n in self.variables}
-        kinds = marks.marks(cell, self.variables[0])
+        names = [n for n in self.variables if n in cell]
+        values = {self.words(n): self._value(cell, n) for n in names}
+        kinds = marks.marks(cell, names[0])
         here = [kind for kind, where in kinds.items() if bool(np.any(where)) and kind != "no_value"]
         if here:
             values["note"] = "; ".join(self._notes[kind] for kind in here)

@@ -112,8 +112,13 @@ def _wider(dataset: xr.Dataset, *axes: Axis) -> Iterator[str]:
 
 
 def boundaries(dataset: xr.Dataset, x: Axis, y: Axis) -> list[Line]:
-    """Find the boundaries between counts from the margins of cells: a line for each count; none without margins."""
+    """Find the boundaries between counts from the margins of cells: a line for each count.
+
+    There are none without margins, nor where these have other axes than the map.
+    """
     if not set(MARGINS) <= set(dataset.data_vars):
+        return []
+    if any({*dataset[name].dims} != {x.name, y.name} for name in MARGINS):
         return []
     counts = Counts.of({name: dataset[name].transpose(y.name, x.name).values for name in MARGINS})
     words = "boundary of counts"

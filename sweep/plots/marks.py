@@ -43,21 +43,25 @@ def marks(dataset: xr.Dataset, name: str) -> dict[str, xr.DataArray]:
     Returns
     -------
     Booleans over the dimensions of the variable, for all kinds.  Kinds that do not concern the variable (a prediction
-    cannot fail, a final spin is no count) are false everywhere.
+    cannot fail, a final spin is no count, a mean over cells is of no single one) are false everywhere.
     """
     found, picture = field(dataset, name), of(name)
     none = found.isnull() & False
 
+    def of_each(variable: str) -> bool:
+        """Return whether the dataset has a code for each value."""
+        return variable in dataset and is_code(dataset[variable]) and {*dataset[variable].dims} <= {*found.dims}
+
     def among(variable: str, *values: int) -> xr.DataArray:
-        """Return where a variable has one of these flags; nowhere if its values are no longer codes."""
-        if not picture.simulated or variable not in dataset or not is_code(dataset[variable]):
+        """Return where a variable has one of these flags; nowhere if it has none for each value."""
+        if not picture.simulated or not of_each(variable):
             return none
         return none | dataset[variable].isin(values)
 
     not_run, failed = among("status", 0), among("status", *FAILURES)
     impossible, missing = among("status", IMPOSSIBLE), found.isnull()
     sound = ~(not_run | failed | impossible)
-    known = picture.simulated and all(each in dataset and is_code(dataset[each]) for each in ("status", "doubts"))
+    known = picture.simulated and of_each("status") and of_each("doubts")
     return {
         "not_run": not_run,
         "failed": failed,

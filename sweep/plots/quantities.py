@@ -5,6 +5,8 @@ Pictures and the explorer share these.  This needs the dataset alone, and no plo
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import xarray as xr
 
 from sweep.config import Config
@@ -34,16 +36,33 @@ def field(dataset: xr.Dataset, name: str) -> xr.DataArray:
     Raises
     ------
     InputError
-        if the dataset has no such variable, nor those from which it is derived.
+        if the dataset has no such variable, nor those from which it is derived, or if the derived one has other values
+        of an axis of the dataset.
     """
     if name in dataset.data_vars:
         return dataset[name]
     if name in (possible := derivable(dataset)):
-        return DERIVED[name](dataset)
+        return _derive(dataset, name)
     if not (choices := [*map(str, dataset.data_vars), *possible]):
         raise fault_of("the dataset has no variable to draw")
     words = f"there is no variable {name}" if name else "name the variable to draw"
     raise fault_of(f"{words}{suggestion(name, choices)}; choose {either(choices)}", "variable")
+
+
+def _derive(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Derive a quantity; refuse an axis that xarray would cut or fill up, without a message, to fit the dataset."""
+    found = DERIVED[name](dataset)
+    if other := [d for d in found.dims if not _same_axis(found, dataset, d)]:
+        words = f"{name} has other values of {other[0]} than the dataset; in its derive, give this axis another name"
+        raise fault_of(words, "variable")
+    return found
+
+
+def _same_axis(found: xr.DataArray, dataset: xr.Dataset, dim: Hashable) -> bool:
+    """Whether an axis has the values that the dataset has of this name, or their number if one has no values."""
+    if dim in found.coords and dim in dataset.variables:
+        return found[dim].reset_coords(drop=True).equals(dataset[dim].reset_coords(drop=True))
+    return dataset.sizes.get(dim, found.sizes[dim]) == found.sizes[dim]
 
 
 def with_derived(dataset: xr.Dataset) -> xr.Dataset:

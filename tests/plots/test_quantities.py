@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from support import ROOT, Write
 from support.cli import invoke
-from support.figures import entries
+from support.figures import entries, made
 
 import sweep
 from sweep.config import load_config
@@ -18,7 +18,8 @@ from sweep.explorer import state
 from sweep.explorer.slices import Source
 from sweep.kernels.status import LIFT_OFF, TIME_LIMIT
 from sweep.plots import picture
-from sweep.plots.pictures import of
+from sweep.plots.pictures import PICTURES, of
+from sweep.plots.pictures.record import Picture
 from sweep.plots.quantities import DERIVED, derivable, field, subject
 from sweep.results.provenance import provenance
 
@@ -100,17 +101,47 @@ def test_the_picture_of_a_configuration_shows_what_it_is_about(name: str, variab
     assert subject(whole.assign_attrs(provenance(config, 1.0, 1))) == variable
 
 
+FIRST = ["reversals", "reversals_predicted", "difference", "t_first_reversal", "ratio"]
+"""What the explorer offers first, among pictures that are added."""
+
+
+@pytest.mark.usefixtures("page")
 def test_the_explorer_offers_all_that_plot_can_draw(whole: xr.Dataset) -> None:
     source = Source(whole)
-    assert set(DERIVED) == set(derivable(whole))
-    assert {name for name in DERIVED if not of(name).draw} < set(source.variables)
-    assert source.variables[:5] == ["reversals", "reversals_predicted", "difference", "t_first_reversal", "ratio"]
+    there = {*whole.data_vars, *whole.dims}
+    possible = {name for name in DERIVED if there.issuperset(of(name).requires)}
+    assert possible == set(derivable(whole))
+    over_axes = {name for name in possible if {*field(whole, name).dims} <= {*source.axes}}
+    assert {name for name in over_axes if not of(name).draw} < set(source.variables)
+    assert [name for name in source.variables if name in FIRST] == FIRST
+    assert {*source.variables[: source.variables.index("status")]} <= {*FIRST, *DERIVED}
+    few = whole[["status", "reversals", "energy_error"]]
+    assert set(DERIVED) & set(Source(few).variables) <= set(derivable(few)) <= set(DERIVED) - set(FIRST)
+
+
+@pytest.mark.usefixtures("page")
+def test_the_explorer_shows_the_values_that_plot_draws(whole: xr.Dataset) -> None:
+    source = Source(whole)
     for name in source.variables:
-        picture.plot(whole, name)
+        if not of(name).draw:
+            picture.plot(whole, name)
         part = source.map(name, "delta", "n0", {"reversal": 1})
-        expected = field(whole, name).isel(reversal=1, missing_dims="ignore")
+        chosen = whole.isel({"reversal": 1} if "reversal" in source.dims_of(name) else {})
+        expected = field(chosen, name).broadcast_like(whole["status"]).transpose("n0", "delta")
         np.testing.assert_array_equal(part.values, expected.values)
-    assert not set(DERIVED) & set(Source(whole[["status", "reversals", "energy_error"]]).variables)
+
+
+def test_the_explorer_shows_what_is_derived_from_several_cells(monkeypatch: pytest.MonkeyPatch) -> None:
+    needs = ("reversals", "sample")
+    mean = Picture("mean", needs, derive=lambda dataset: dataset["reversals"].mean("sample"))
+    monkeypatch.setitem(PICTURES, mean.name, mean)
+    monkeypatch.setitem(DERIVED, mean.name, mean.derive)
+    sampled = made(n0=[0.02, 0.05]).rename(b="sample")
+    sampled["reversals"] += sampled["sample"].astype("int16")
+    source = Source(sampled)
+    np.testing.assert_allclose(source.map("mean", "mu", "n0", {}).values, sampled["reversals"].mean("sample").T)
+    assert "mean" in source.variables
+    assert "mean" not in source.values_at({"mu": 1, "sample": 2})
 
 
 def test_a_later_reversal_is_not_taken_for_the_first(whole: xr.Dataset) -> None:
