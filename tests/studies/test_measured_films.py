@@ -4,9 +4,9 @@ Bodies and films are made by another program (`support.films`).  A campaign trie
 
     SWEEP_FILMS=0:20 SWEEP_SPOILT=0:10 python -m pytest -n0 -s -m campaign tests/studies/test_measured_films.py
 
-(with --timeout=0; a film takes a minute of processor time).  Of SWEEP_FILMS_SEED=278952100 and 2617345860, 36 of 39
-intervals hold the friction, in the median 2.9 and 2.4 times as wide as with exact sizes, for 2.0 and 1.8 times as many
-trajectories.  Ten of 19 spoilt films have their fault named: a late start, another law or frame rate often cannot be
+(with --timeout=0; a film takes a minute of processor time).  Of SWEEP_FILMS_SEED=278952100 and 2617345860, 37 of 40
+intervals hold the friction, in the median 2.9 and 2.2 times as wide as with exact sizes, for 2.0 and 1.8 times as many
+trajectories.  Eleven of 20 spoilt films have their fault named: a late start, another law or frame rate often cannot be
 told from right ones, as start and sizes make up for them within the noise.  So the second test passes for the film that
 it tries by default, and not for all.
 """
