@@ -81,6 +81,7 @@ def test_scripts_make_rows_of_the_reference_tables_again(monkeypatch: pytest.Mon
     assert f"{spins.as_decimals([found])[0]:.18g}" == row["spin"]
 
 
+@pytest.mark.campaign
 def test_certain_counts_of_wide_cells_are_followed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
