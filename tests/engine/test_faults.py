@@ -171,7 +171,7 @@ integrator: {{t_end: 200}}
     [
         (TEXT, SOME),
         (VARIANT, Counter(kernel=1, dataset=1)),
-        (OWN, Counter(kernel=1, tile=1)),
+        pytest.param(OWN, Counter(kernel=1, tile=1), marks=pytest.mark.campaign),
         pytest.param(TEXT, MANY, marks=pytest.mark.campaign),
         pytest.param(VARIANT, Counter(kernel=4, checkpoint=4, tile=4), marks=pytest.mark.campaign),
     ],

@@ -185,7 +185,8 @@ print(sweep.predict({"cases": cases}, measure=["estimate"])["reversals_estimated
     assert first == second
 
 
-@pytest.mark.parametrize("folder", ["none at all", pytest.param("a file in its place", marks=pytest.mark.campaign)])
+@pytest.mark.campaign
+@pytest.mark.parametrize("folder", ["none at all", "a file in its place"])
 def test_without_a_cache_a_run_compiles_for_itself(folder: str, write: Write, tmp_path: Path) -> None:
     """The averaged model: its kernel compiles fastest."""
     (tmp_path / "cache").write_text("", encoding="utf-8")

@@ -42,7 +42,10 @@ print(json.dumps([way, *(found[name].values.tolist() for name in ("spin_final", 
 
 @pytest.mark.parametrize(
     ("method", "function", "wanted"),
-    [("dopri5", slip.equations(slip.MODEL.variant), "step"), ("adams", stiff_slip._compliance, "body")],
+    [
+        ("dopri5", slip.equations(slip.MODEL.variant), "step"),
+        pytest.param("adams", stiff_slip._compliance, "body", marks=pytest.mark.campaign),
+    ],
 )
 def test_a_debugger_stops_in_the_equations(method: str, function: Callable[..., Any], wanted: str) -> None:
     """Without compilation a run takes the same steps in plain Python, to numbers that are the same to rounding."""

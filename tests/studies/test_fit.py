@@ -519,12 +519,16 @@ def test_an_interval_includes_the_error_of_what_was_measured(write: Write) -> No
     assert widths[0] > 1.1 * np.linalg.norm(columns[0]) ** -1
 
 
-@pytest.mark.usefixtures("by_formula")
 def test_the_speed_of_a_dry_law_is_free_unless_it_is_given(write: Write) -> None:
     dry = write(SCENE.replace("mu: [30, 100]", "law: coulomb, mu: 0.3") + "integrator: {t_end: 150}\n")
     film = Film(TIMES[:60], FORMULA[:60])
-    assert sweep.fit(dry, film, ["n0"], x0=0.0, y0=0.0).parameter.values.tolist() == ["n0", "speed"]
-    assert sweep.fit(dry, film, ["n0"], x0=0.0, y0=0.0, speed=0.01).parameter.values.tolist() == ["n0"]
+    for given, free in ({}, ["n0", "speed"]), ({"speed": 0.01}, ["n0"]):
+        with (
+            patch("sweep.studies.search.found", side_effect=InterruptedError) as found,
+            pytest.raises(InterruptedError),
+        ):
+            sweep.fit(dry, film, ["n0"], x0=0.0, y0=0.0, **given)
+        assert list(found.call_args.args[0].free) == free
 
 
 def test_the_floor_of_a_bent_valley_is_followed_in_few_steps() -> None:
