@@ -129,7 +129,7 @@ def _judged(lives: Lives, which: Array, met: Met) -> Going:
 
     After `ROUNDS` halvings, or when half the step would need more than `MOST_STEPS`, the same failure at another time
     suffices if the energy balance is sound. A run that meets another failure than the run before is halved up to
-    `FALSE_ROUNDS` times. What is still doubtful then has `DIVERGED`, and misses its tolerance.
+    `FALSE_ROUNDS` times. What is still doubtful then has `DIVERGED`.
 
     With a fixed step, a failed run is repeated once, with half the step. If that meets the same failure within the time
     of one step, the failure is genuine, and its time and spin are those of the repeat. Otherwise the cell has

@@ -185,10 +185,10 @@ def _make_will_settle(layout: Layout, may_settle, saturates: bool, *, damped: bo
     had not settled by t = 30 000 do now; none of 5429 counts changed.  It does not hold where
     friction `saturates`, since the rattle that grows there leaves the energies at which the law is linear.
 
-    A couple can damp the spin (`damped`) out of an outer range into one where the rattle grows, or below what is left
-    of a rattle that decays more slowly.  With such a couple a trajectory has settled only within the share of the
-    inner range in `STABLE` (`sweep.models.theory.stability`), or when no rattle is left.  Without this rule, 35 of 445
-    certain counts of a draw with strong couples were false.
+    A couple that damps the spin (`damped`) can carry it out of an outer range into one where the rattle grows, or below
+    what is left of a rattle that decays more slowly.  With such a couple a trajectory has settled only within the share
+    of the inner range in `STABLE` (`sweep.models.theory.stability`), or when no rattle is left.  Without this rule, 35
+    of 445 certain counts of a draw with strong couples were false.
     """
     FROM, TO, SHARE = map(layout.at, (STABLE[0], STABLE[1], STABLE[-1]))
     is_stable, stays = make_stays(layout), make_stays(layout, 1.0 if saturates else BEYOND)

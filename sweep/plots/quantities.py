@@ -59,7 +59,7 @@ def _derive(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _same_axis(found: xr.DataArray, dataset: xr.Dataset, dim: Hashable) -> bool:
-    """Whether an axis has the values that the dataset has of this name, or their number if one has no values."""
+    """Return whether an axis has the values that the dataset has of this name, or their number if one has no values."""
     if dim in found.coords and dim in dataset.variables:
         return found[dim].reset_coords(drop=True).equals(dataset[dim].reset_coords(drop=True))
     return dataset.sizes.get(dim, found.sizes[dim]) == found.sizes[dim]

@@ -125,16 +125,17 @@ def check_length(problem: Problem) -> None:
 
 def found(problem: Problem, note: Note) -> tuple[Problem, list[Minimum]]:
     """Return the minima over the whole film, lowest first, and the problem with the final ranges and outliers."""
-    tried: list[tuple[Problem, list[Minimum]]] = []
+    tried: list[tuple[Problem, list[Minimum], bool]] = []
     for points, kept, hold in SEARCHES:
         *_, (_, minima) = searched(problem, points, kept, note, hold=hold)
         calm, minima = settled(problem, minima, note)
-        tried.append((calm, minima))
+        fits = verdict.judged(calm, minima[0]).fits
+        tried.append((calm, minima, fits))
         # A wider range may have led into a corner far from the minimum.
-        if calm.free == problem.free and verdict.judged(calm, minima[0]).fits:
+        if calm.free == problem.free and fits:
             break
-    problem, minima = min(tried, key=lambda each: each[1][0].misfit)
-    if verdict.judged(problem, minima[0]).fits:
+    problem, minima, fits = min(tried, key=lambda each: each[1][0].misfit)
+    if fits:
         # Slopes at the ends of ranges are exact only now: by rough ones, a range was not widened that is too narrow.
         minima = _minimised(problem, [each.place for each in minima], enough=ENOUGH)
         problem, minima = settled(problem, minima, note, ENOUGH)
